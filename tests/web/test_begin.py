@@ -132,12 +132,14 @@ def test_a_search_that_is_stopped_keeps_what_its_refinement_has_reached(
     body = {"title": "own", "session": "aa", "task": SIZED, "steps": 40, "chains": 1}
     name = client.post("/api/runs", json=body).json()["id"]
 
-    def is_refined() -> bool:
+    def news() -> Any:
         with client.websocket_connect(f"ws://localhost:8642/api/runs/{name}/live") as live:
-            refined = json.loads(live.receive_text())["refined"]
-        return refined is not None and refined["objective"] is not None
+            update = json.loads(live.receive_text())
+        return update["moved"] if update["moved"] and update["moved"]["problem"] else None
 
-    wait_for(is_refined, 400.0)
+    drawn = wait_for(news, 400.0)
+    assert np.abs(np.subtract(drawn["problem"]["positions"], problem["positions"])).max() > 1e-3
+    assert drawn["items"][0]["label"] == "off-axis motion"
     client.post(f"/api/runs/{name}/stop")
     wait_for(lambda: status_of(client, name) == "stopped", 100.0)
     run = client.get(f"/api/runs/{name}").json()

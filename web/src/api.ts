@@ -137,7 +137,8 @@ export interface RunUpdate {
   left: number | null;
   tried: [number, number] | null;
   refined: { designs: number; geometries: number; sheets: number; /** Largest number of geometries. */ most: number; objective: number | null } | null;
-  moved: { mask: string; efficiency: number | null; displacement: number[] | null; items: ItemState[] | null; objectives: Objective[] } | null;
+  /** The displayed design, with the nodes of its problem if it is refined; null for the one sent before. */
+  moved: { mask: string; problem: Problem | null; efficiency: number | null; displacement: number[] | null; items: ItemState[] | null; objectives: Objective[] } | null;
   error?: { message: string };
 }
 

@@ -31,6 +31,9 @@ const ROTATION_IN_SPACE = "Size of the rotation of the output, about whatever ax
 /** Quantities that may be maximised. */
 const MAXIMISED: string[] = ["gain", "travel", "rotation", "payload", "stiffness", "blocked_force"];
 
+/** Quantities that may be minimised, with a bound on the motion beside them. */
+const MINIMISED: string[] = ["off_axis", "sag"];
+
 /** What an output begins with that turns, or moves along a direction. */
 const TURN = { direction: undefined, gain: undefined, travel: undefined, off_axis: undefined, path: undefined, payload: undefined, sag: undefined, rotation: [{ maximise: true }] };
 const MOTION = { direction: "left", rotation: undefined, gain: [{ maximise: true }], off_axis: [{ at_most: "10%" }] };
@@ -238,9 +241,11 @@ function itemRow(key: string, name: string, { title, bound: usual, example, abou
   const isOffered = MAXIMISED.includes(name) && (name !== "rotation" || isMaximised);
   const maximise = h("input", { type: "checkbox", checked: isMaximised, "data-key": `${key}-maximise` });
   maximise.addEventListener("change", () => change({ maximise: maximise.checked || undefined, ...(maximise.checked || value !== undefined ? {} : { [bound]: example }) }));
+  const minimise = h("input", { type: "checkbox", checked: known.minimise === true, "data-key": `${key}-minimise` });
+  minimise.addEventListener("change", () => change({ minimise: minimise.checked || undefined }));
   const extra: (keyof Bounds)[] = ["at_least", "at_most", "target", "tolerance", "from", "to", "scale"];
   const labels: Record<string, string> = { at_least: "at least", at_most: "at most", target: "equal to", tolerance: "tolerance", from: "from (stroke)", to: "to (stroke)", scale: "scale" };
-  const hasMore = extra.some((other) => other !== bound && known[other] !== undefined) || known.of !== undefined || known.minimise;
+  const hasMore = extra.some((other) => other !== bound && known[other] !== undefined) || known.of !== undefined;
   const of = select([["", "every value"], ["largest", "the largest"], ["smallest", "the smallest"], ["spread", "the spread"]], known.of ?? "", (picked) => change({ of: picked || undefined } as Bounds));
   of.dataset.key = `${key}-of`;
   const input = amount(key, "", value, "", (next) => change({ [bound]: next }), value === undefined && !isMaximised ? `such as ${example}` : "");
@@ -251,6 +256,7 @@ function itemRow(key: string, name: string, { title, bound: usual, example, abou
       h("span", { class: "quantity", title: about }, title), kind, input,
       button("✕", () => put(null), "quiet small", { "data-key": `${key}-drop`, "aria-label": `Remove ${title}`, title: "Remove" })),
     isOffered && h("label", { class: "tick" }, maximise, "as large as possible"),
+    MINIMISED.includes(name) && h("label", { class: "tick" }, minimise, "as small as possible"),
     h("details", { ...(hasMore ? { open: true } : {}) }, h("summary", { "data-key": `${key}-more` }, "Other bounds"),
       h("p", { class: "note" }, about),
       isOffered ? null : h("label", { class: "tick" }, maximise, "as large as possible"),

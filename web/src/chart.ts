@@ -14,6 +14,8 @@ export class Chart {
     new ResizeObserver(() => this.draw()).observe(this.svg);
   }
 
+  /** Size of a unit of the curves in the unit of the axis, such as mm. */
+  unit = 1;
   private level: { title: string; value: number } | null = null;
   private steps = 1;
   private shaded = true;
@@ -60,8 +62,8 @@ export class Chart {
       for (const [, now, top] of curve) {
         for (const value of [now, top]) {
           if (value === null || value < -50) continue;
-          low = Math.min(low, value);
-          high = Math.max(high, value);
+          low = Math.min(low, value * this.unit);
+          high = Math.max(high, value * this.unit);
         }
         if (top !== null && top > best) { best = top; bestChain = chain; }
       }
@@ -96,12 +98,12 @@ export class Chart {
       let pen = "M";
       for (const [step, now] of this.curves.get(chain)!) {
         if (now === null || now < -50) { pen = "M"; continue; }
-        d += `${pen}${x(step).toFixed(1)} ${y(now).toFixed(1)}`;
+        d += `${pen}${x(step).toFixed(1)} ${y(now * this.unit).toFixed(1)}`;
         pen = "L";
       }
       parts.push(s("path", { class: chain === bestChain ? "curve best" : "curve", d }));
       const last = this.curves.get(chain)!.at(-1);
-      if (chain === bestChain && last && last[1] !== null) parts.push(s("circle", { class: "head", cx: x(last[0]), cy: y(last[1]), r: 3.5 }));
+      if (chain === bestChain && last && last[1] !== null) parts.push(s("circle", { class: "head", cx: x(last[0]), cy: y(last[1] * this.unit), r: 3.5 }));
     }
     this.svg.replaceChildren(...parts);
   }

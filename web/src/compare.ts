@@ -1,10 +1,10 @@
 // Designs side by side: their motions, figures and items.
 
-import { post, type PartFigures, type PartReport, type ServerError } from "./api";
+import { post, type PartReport, type ServerError } from "./api";
 import { clear, h } from "./dom";
 import { Player } from "./player";
 import { designSubject, partOf, type Subject } from "./result";
-import { figureTable, itemTable, verdictOf } from "./specification";
+import { figureColumns, figureTable, type FigureColumn, itemTable, verdictOf } from "./specification";
 import { sentence } from "./text";
 
 /** One of the compared designs. */
@@ -25,13 +25,13 @@ class Side {
   }
 
   /** Compute the part, show its items and return its figures with a title each. */
-  async load(): Promise<{ title: string; row: PartFigures }[]> {
+  async load(): Promise<FigureColumn[]> {
     const { title, problem, mask } = this.subject;
     const { figures, items: { frames }, specified } = await post<PartReport>("/report", { problem, mask, part: partOf(this.subject) });
     this.verdict.className = `verdict ${frames === null ? "none" : frames.every(({ met }) => met) ? "met" : "missed"}`;
     clear(this.verdict, frames ? `${verdictOf(frames)}.` : specified ? "The path is not stable." : "No specification.");
     clear(this.items, frames && itemTable([{ title: "frames", items: frames }]));
-    return figures.map((row) => ({ title: figures.length > 1 ? `${title}: ${row.case}, ${row.output}` : title, row }));
+    return figureColumns([[title, figures]]);
   }
 }
 
@@ -58,7 +58,7 @@ export class ComparePage {
   private async load(): Promise<void> {
     try {
       const shown = (await Promise.all(this.sides.map((side) => side.load()))).flat();
-      clear(this.table, figureTable(shown.map(({ row }) => row), shown.map(({ title }) => title)));
+      clear(this.table, figureTable(shown));
     } catch (error) {
       clear(this.table, h("p", { class: "fault", role: "alert" }, sentence((error as ServerError).message)));
     }

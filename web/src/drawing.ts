@@ -31,6 +31,8 @@ export interface LatticeDrawing {
   rest: Float64Array;
   at: Float64Array;
   setLattice(positions: Point[], beams: [number, number][]): void;
+  /** Give the same lattice another geometry, in the same view. */
+  setGeometry(positions: Point[], section: Section): void;
   draw(groups: Group[]): void;
   ghost(name: string, beams: ArrayLike<number>): void;
   mark(name: string, nodes: ArrayLike<number>): void;
@@ -83,6 +85,11 @@ export class Drawing implements LatticeDrawing {
     }
     this.box = { x: x0 - margin, y: -y1 - margin, w: x1 - x0 + 2 * margin, h: y1 - y0 + 2 * margin };
     this.setView(this.box);
+  }
+
+  setGeometry(positions: Point[]): void {
+    this.rest = flatten(positions);
+    this.at = this.rest;
   }
 
   /** Enlarge the view, if necessary, so that displaced beams are inside. */

@@ -6,7 +6,7 @@ import { announce, button, choice, clear, field, figure, h, iconButton, number, 
 import { emptyPlan, isPlan, MOST, portLabel, portsOf, readPlan, withoutPart, withPart, writePlan, type Plan, type PlanEnd, type PlanPart, type Port, type WrittenPlan } from "./plan";
 import { collectionView, thumbnail } from "./collections";
 import { partOf } from "./result";
-import { figureTable } from "./specification";
+import { figureColumns, figureTable } from "./specification";
 import { History } from "./task";
 import { sentence, undoKeys } from "./text";
 
@@ -246,7 +246,7 @@ export class MachinePage {
         ...linkRows,
         ports.length > 2 && button("Add link", () => this.set({ ...plan, links: [...plan.links, { from: ports[1]!, to: ports[2]!, kind: "bridge" }] })),
         h("button", { type: "button", class: "primary", disabled: !this.built, "data-key": "build", onclick: () => void this.build() }, "Assemble"),
-        this.report !== null && typeof this.report !== "string" && figureTable(this.report.figures),
+        this.report !== null && typeof this.report !== "string" && figureTable(figureColumns([["frames", this.report.figures]])),
         !this.built && this.fault.textContent && h("p", { class: "fault" }, this.fault.textContent)));
   }
 

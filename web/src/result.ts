@@ -1,12 +1,12 @@
 // The panel beside a design: its specification, figures, part, files and next steps.
 
-import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, post, session, type Collection, type Comparison, type ItemState, type Part, type PartReport, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
+import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, post, session, type Collection, type Comparison, type ItemState, type Part, type PartFigures, type PartReport, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
 import { compareAddress } from "./address";
 import { openTask } from "./begin";
 import { button, clear, count, download, duration, field, figure, h, number, select } from "./dom";
 import { where } from "./drawing";
 import { Player, type Picture } from "./player";
-import { figureTable, itemTable, otherObjective, verdictOf, type Column } from "./specification";
+import { figureColumns, figureTable, FRAMES, itemTable, otherObjective, verdictOf, type Column } from "./specification";
 import type { Table } from "./task";
 import { fileName, REMEDIES, sentence } from "./text";
 
@@ -28,14 +28,13 @@ export interface Subject {
   place: [string, string] | null;
 }
 
-interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null; items: ItemState[] | null }
+interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null; items: ItemState[] | null; figures: PartFigures[] | null }
 interface Remarks { size: [number, number, number]; volume: number; mass: number | null; stroke: number | null; remarks: string[]; touching: number[] }
 interface Print { minutes: number | null; layers: number; layer_mm: number; mass: number | null; slicer: string; profile: string }
 
-/** The level of the printed outline, in which a part with a specification is checked at once. */
-const OUTLINE = "plane";
-
-const SOLID = "2D solid";
+/** The level of the printed body, in which a specification is checked; that of a part in space takes minutes. */
+const FLAT_BODY = { level: "plane", title: "2D solid", words: "the 2D solid, the printed outline" };
+const SPACE_BODY = { level: "solid", title: "3D solid", words: "the 3D solid, the printed body" };
 
 /** Effort of a search that begins with a design. */
 const CONTINUED = { steps: 8000, chains: 2 };
@@ -56,6 +55,7 @@ export class Result {
   private readonly trouble = h("p", { class: "fault", role: "alert" });
   private readonly toleranceBox = h("div", { class: "content" });
   private readonly partBox = h("div", { class: "content" });
+  private readonly fileNote = h("p", { class: "note content" });
   private readonly filesBox = h("div", { class: "content" });
   private part: Part;
   private report: PartReport | string | null = null;
@@ -75,7 +75,7 @@ export class Result {
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Result"), this.headline, this.verdict, this.warnings, this.advice, this.reportBox, this.table, this.trouble),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Tolerance"), this.toleranceBox),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Part"), this.partBox),
-      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Download"), this.filesBox),
+      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Download"), this.fileNote, this.filesBox),
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Next steps"), this.nextSteps()));
     this.showTable();
     this.showTolerance();
@@ -88,8 +88,9 @@ export class Result {
     if (this.isPart && !this.known.fems["frame"]) void this.validate("frame", false);
     void fetchRegistries().then((found) => {
       this.registries = found;
-      const outline = found.levels.find(({ name }) => name === OUTLINE);
-      if (this.subject.problem.specification && !isInSpace(this.subject.problem) && outline && !outline.missing && !this.known.fems[OUTLINE]) void this.validate(OUTLINE, false);
+      const { level } = this.body;
+      const isQuick = this.body === FLAT_BODY && found.levels.some(({ name, missing }) => name === level && !missing);
+      if (this.subject.problem.specification && isQuick && !this.known.fems[level]) void this.validate(level, false);
       this.showTable();
       this.showPart();
       this.showFiles();
@@ -116,6 +117,9 @@ export class Result {
     else if (tolerance && typeof tolerance !== "string") this.player.showLosses(tolerance.losses, false);
     if (print === "running") void this.slice();
   }
+
+  /** The model of the printed body. */
+  private get body(): typeof FLAT_BODY { return isInSpace(this.subject.problem) ? SPACE_BODY : FLAT_BODY; }
 
   /** Whether a level or a file is for parts of this dimension. */
   private readonly isOffered = ({ in_space }: { in_space: boolean }): boolean => in_space || !isInSpace(this.subject.problem);
@@ -153,28 +157,31 @@ export class Result {
       clear(this.reportBox);
       return;
     }
-    const outline = this.known.fems[OUTLINE];
-    const solid = typeof outline === "object" ? outline : null;
+    const { level, title, words } = this.body;
+    const found = this.known.fems[level];
+    const solid = typeof found === "object" ? found : null;
     const first = report.figures[0];
     const objective = otherObjective(report.objectives);
     clear(this.headline, h("strong", {}, objective?.reached ?? figure(first?.efficiency, 2)),
-      h("span", {}, h("b", { class: "model" }, "frames, 8 elements in each strut"), h("br"),
+      h("span", {}, h("b", { class: "model" }, FRAMES), h("br"),
         `${objective ? sentence(objective.label).slice(0, -1) : "Output / input motion"} of the part with ${this.strutText()} struts`,
-        solid?.efficiency != null && h("span", {}, h("br"), `${figure(solid.efficiency, 2)} as output / input motion in the 2D solid, the printed outline`)));
+        solid?.efficiency != null && h("span", {}, h("br"), `${figure(solid.efficiency, 2)} as output / input motion in ${words}`)));
     const columns: Column[] = [];
     // The model of the search is that of the frames, with fewer elements.
     if (report.items.frames) columns.push({ title: "frames", items: report.items.frames });
     else if (report.items.search) columns.push({ title: "search", items: report.items.search });
-    if (solid?.items) columns.push({ title: SOLID, items: solid.items });
+    if (solid?.items) columns.push({ title, items: solid.items });
     const last = columns.at(-1)?.items ?? null;
     const unstable = !first || first.efficiency === undefined || (report.specified && !report.items.frames);
     const isMet = last !== null && columns.every(({ items }) => items.every(({ met }) => met)) && !unstable;
-    this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? (solid?.items || isInSpace(this.subject.problem) ? "met" : "met pending") : "missed"}`;
-    const pending = outline === "running" ? "; the 2D solid, the printed outline, is being computed …" : !solid && !isInSpace(this.subject.problem) ? "; not checked in the 2D solid, the printed outline" : "";
-    const by = solid?.items ? " by frames and in the 2D solid, the printed outline" : " by frames";
+    this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? (solid?.items ? "met" : "met pending") : "missed"}`;
+    const pending = found === "running" ? `; ${words}, is being computed …` : !solid ? `; not checked in ${words}` : !solid.items ? `; not stable in ${words}` : "";
+    const by = solid?.items ? ` by frames and in ${words}` : " by frames";
     clear(this.verdict, unstable ? "The part snaps or collapses before the full stroke, by frames with 8 elements in each strut."
-      : last ? `${verdictOf(last)}${isMet || !solid?.items ? by : " in the 2D solid, the printed outline"}${pending}.` : "No specification: the task says nothing about straightness, rotation or load.");
-    clear(this.reportBox, columns.length > 0 && itemTable(columns), figureTable(report.figures));
+      : last ? `${verdictOf(last)}${isMet || !solid?.items ? by : ` in ${words}`}${pending}.` : "No specification: the task says nothing about straightness, rotation or load.");
+    const models: [string, PartFigures[]][] = [["frames", report.figures]];
+    if (solid?.figures) models.push([title, solid.figures]);
+    clear(this.reportBox, columns.length > 0 && itemTable(columns), figureTable(figureColumns(models)));
     const better = this.subject.comparison?.efficiency ?? null;
     const defect = unstable ? "The part has no stable path to the full stroke."
       : last && !isMet ? "The specification is not met."
@@ -185,6 +192,7 @@ export class Result {
 
   private showTable(): void {
     this.showReport();
+    this.fileNote.textContent = this.unchecked;
     const { efficiency, comparison, mask } = this.subject;
     const beams = bitsOf(mask, this.subject.problem.beams.length).reduce((a, b) => a + b, 0);
     const rows: (HTMLElement | null)[] = [
@@ -357,6 +365,17 @@ export class Result {
     }
   }
 
+  /** Why the files may not be those of a part that meets its specification; empty if they are. */
+  private get unchecked(): string {
+    const { body: { level, words }, report } = this;
+    if (!this.subject.problem.specification || report === null || typeof report === "string") return "";
+    const found = this.known.fems[level];
+    const solid = typeof found === "object" ? found : null;
+    if (!report.items.frames?.every(({ met }) => met)) return "This part does not meet its specification.";
+    if (!solid) return `This part is not checked in ${words}.`;
+    return solid.items?.every(({ met }) => met) ? "" : `This part does not meet its specification in ${words}.`;
+  }
+
   private showFiles(fault = ""): void {
     // One process computes finite elements, tolerances and files, one after the other.
     const waits = Object.values(this.known.fems).includes("running") || this.known.tolerance === "running" || this.known.print === "running";
@@ -433,10 +452,12 @@ export class Result {
     if (place) void this.offer(others, place);
     return h("div", {}, h("div", { class: "content buttons" },
       plan && button("Open its plan", () => { location.hash = `#/machine/${plan}`; }, "strong"),
-      problem.specification && button("Refine", () => void this.begin(true), "", { title: "Move the nodes and change the widths of this design" }),
-      button("Search on", () => void this.begin(false), "", { title: "A new search that begins with this design" }),
+      problem.specification && button("Refine", () => void this.begin(true)),
+      button("Search on", () => void this.begin(false)),
       button("Open its task", () => void open(false)),
       button("Change by hand", () => void open(true))),
+      h("p", { class: "note content" }, problem.specification ? "Refine moves the nodes of this design and changes its widths until it meets all items with a larger objective. " : "",
+        "Search on begins a new search with this design. Both keep this one."),
       place && h("div", { class: "content" }, field("Compare with", others)));
   }
 

@@ -1,6 +1,6 @@
 // The progress of a search, and its result.
 
-import { fetchRegistries, follow, get, isInSpace, modelOf, post, remove, type Registries, type RunUpdate, type ServerError, type Run, type RunDetails } from "./api";
+import { fetchRegistries, follow, get, isInSpace, modelOf, post, remove, type Problem, type Registries, type RunUpdate, type ServerError, type Run, type RunDetails } from "./api";
 import { bitsOf } from "./api";
 import { Chart } from "./chart";
 import { Drawing, markRegions, sectionOf, where, type LatticeDrawing } from "./drawing";
@@ -27,6 +27,8 @@ export class RunPage {
   private readonly switcher = h("div", { class: "bar" });
   private result: Result | null = null;
   private shown = "";
+  /** Problem of the drawn design, if it is refined. */
+  private refined: Problem | null = null;
   private isAtRest = false;
   private isClosed = false;
   /** What the user has asked for that the server has not done yet. */
@@ -80,8 +82,9 @@ export class RunPage {
   private receive(update: RunUpdate): void {
     if (update.error) { this.trouble.textContent = sentence(update.error.message); return; }
     const before = this.run.status;
-    this.update = update;
+    this.update = { ...update, moved: update.moved ?? this.update?.moved ?? null };
     this.run = { ...this.run, ...update.run };
+    this.chart.unit = this.unit;
     if (Object.keys(update.points).length || update.reset) this.chart.add(update.points, update.reset);
     this.show(this.run);
     if (!this.result) this.drawLive();
@@ -92,12 +95,12 @@ export class RunPage {
   private drawLive(): void {
     const { update } = this;
     if (this.showing === "human" && this.run.comparison) {
-      this.draw(this.run.comparison.mask, null);
+      this.draw(this.run.comparison.mask, null, null);
       return;
     }
     const chain = this.chain === "best" ? null : update?.chains[this.chain];
-    if (chain) this.draw(chain.mask, null);
-    else if (update?.moved) this.draw(update.moved.mask, update.moved.displacement);
+    if (chain) this.draw(chain.mask, null, null);
+    else if (update?.moved) this.draw(update.moved.mask, update.moved.displacement, update.moved.problem);
   }
 
   /** Open the drawing, flat or in space, with the design that the search begins with. */
@@ -115,13 +118,19 @@ export class RunPage {
     this.drawing.setLattice(problem.positions, problem.beams);
     if (this.drawing instanceof Drawing && this.run.part) this.drawing.dimensions(this.run.part.scale);
     this.paper.append(this.drawing.element);
-    this.draw(problem.initial, null);
+    this.draw(problem.initial, null, null);
     this.drawLive();
   }
 
-  private draw(mask: string, displacement: number[] | null): void {
+  /** Draw a design; `refined` is its problem if its nodes have moved. */
+  private draw(mask: string, displacement: number[] | null, refined: Problem | null): void {
     const { drawing } = this;
-    if (!drawing || (mask === this.shown && !displacement && this.isAtRest)) return;
+    if (!drawing || (mask === this.shown && refined === this.refined && !displacement && this.isAtRest)) return;
+    if (refined !== this.refined) {
+      const shape = refined ?? this.run.problem;
+      drawing.setGeometry(shape.positions, sectionOf(shape));
+      this.refined = refined;
+    }
     const bits = bitsOf(mask, this.run.problem.beams.length);
     const old = bitsOf(this.shown || mask, bits.length);
     this.isAtRest = !displacement;
@@ -203,19 +212,17 @@ export class RunPage {
     bar.value = share;
     clear(this.live.querySelector("dl")!, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
     const reached = this.update?.moved?.items;
-    clear(this.items, !this.result && reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by the best design so far, before refinement.`),
-      !this.result && reached && itemTable([{ title: "search", items: reached }]));
+    clear(this.items, !this.result && reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by the ${this.update!.moved!.problem ? "best refined design so far" : "best design so far, before refinement"}.`),
+      !this.result && reached && itemTable([{ title: "frames", items: reached }]));
     if (run.message && run.status !== "running") this.showMessage(run);
     if (!this.result) {
       const moved = this.update?.moved;
       const objective = otherObjective(moved?.objectives ?? []);
       const value = moved?.efficiency ?? run.efficiency ?? this.chart.best;
-      if (objective) this.curveTitle.textContent = `Objective along the search: ${objective.label}`;
+      if (objective) this.curveTitle.textContent = `Objective along the search: ${objective.label}${this.unit === 1 ? "" : ", mm"}`;
       else if (moved?.objectives.length) this.curveTitle.textContent = `Objective along the search: ${moved.objectives[0]!.label}`;
-      const better = this.update?.refined?.objective ?? null;
       clear(this.readout, value !== null && h("strong", {}, objective?.reached ?? figure(value, 3)),
-        better !== null && h("span", {}, h("b", {}, `refined so far: objective ${figure(better * this.unit, 2)}`)),
-        h("span", {}, `${better === null ? "" : "drawn, before refinement: "}${objective ? `${objective.label} of the ` : ""}${this.stateText(run, value !== null || better !== null, done)}`));
+        h("span", {}, `${objective ? `${objective.label} of the ` : ""}${this.stateText(run, value !== null, done)}`));
     }
   }
 
@@ -249,7 +256,7 @@ export class RunPage {
 
   private stateText(run: Run, known: boolean, done: number): string {
     if (run.status !== "running") return run.status;
-    if (known) return `best design so far, ${modelOf(this.run.problem)}`;
+    if (known) return `best ${this.update?.moved?.problem ? "refined design" : "design"} so far, ${modelOf(this.run.problem)}`;
     return done ? "No admissible design yet." : "Starting …";
   }
 
@@ -272,7 +279,7 @@ export class RunPage {
       if (!moved) { this.trouble.textContent = "There is no design yet."; return; }
       try {
         const { source, key } = await post<{ source: string; key: string }>("/gallery", {
-          problem: run.problem, mask: moved.mask, title: `${run.title}, best so far`.slice(0, 120), provenance: { kind: "machine", part: run.part, task: run.task },
+          problem: moved.problem ?? run.problem, mask: moved.mask, title: `${run.title}, best so far`.slice(0, 120), provenance: { kind: "machine", part: run.part, task: run.task },
         });
         open(`#/design/${source}/${key}`, "_blank", "noopener");
       } catch (error) {
@@ -291,7 +298,7 @@ export class RunPage {
       (status === "running" || status === "queued") && button("Pause", () => void act("pause", "Pausing …")()),
       status === "running" && button(run.refine ? "Stop and take the result" : "Stop and choose the best", () => void act("stop", run.refine ? "Stopping the refinement …" : "Choosing and verifying the best design …")(), "strong"),
       status === "running" && !run.refine && button("Open the best so far", () => void keep(), "", { title: "Store it in the gallery, and open it in another tab; the search goes on" }),
-      (status === "paused" || status === "stopped" || status === "failed") && button(status === "failed" ? "Retry" : "Continue", () => void act("resume")(), "strong"),
+      (status === "paused" || (status === "stopped" && !run.refine) || status === "failed") && button(status === "failed" ? "Retry" : "Continue", () => void act("resume")(), "strong"),
       status === "paused" && !run.refine && button("Choose the best", () => void act("stop")()),
       status === "running" && refines && h("p", { class: "note" }, "A search that is stopped keeps what its refinement has reached; its design can be refined further later."),
       status !== "running" && button("Delete", () => void erase(), "quiet"));

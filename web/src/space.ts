@@ -140,8 +140,8 @@ export class SpaceDrawing implements LatticeDrawing {
     this.rest = Float64Array.from(positions.flat() as number[]);
     this.at = this.rest;
     this.beams = beams;
-    const { width, widths, thickness } = this.section;
-    this.width = Float64Array.from(beams, (_, k) => widths?.[k] ?? width);
+    const { thickness, width } = this.section;
+    this.setWidths(this.section);
     this.thickness = this.dimension === 2 ? thickness ?? width : 0;
     for (const mesh of [this.struts, this.joints]) if (mesh) { this.scene.remove(mesh); mesh.dispose(); }
     const material = (): MeshLambertMaterial => new MeshLambertMaterial();
@@ -153,6 +153,14 @@ export class SpaceDrawing implements LatticeDrawing {
     this.frameOn([this.rest], this.rest.length / this.dimension);
     this.look(this.dimension === 2 ? 18 : AZIMUTH, this.dimension === 2 ? 14 : ELEVATION);
   }
+
+  setGeometry(positions: Point[], section: Section): void {
+    this.rest = Float64Array.from(positions.flat() as number[]);
+    this.at = this.rest;
+    this.setWidths(section);
+  }
+
+  private setWidths({ width, widths }: Section): void { this.width = Float64Array.from(this.beams, (_, k) => widths?.[k] ?? width); }
 
   /** Show the region of positions of nodes. */
   private frameOn(all: ArrayLike<number>[], count: number, nodes: ArrayLike<number> = Array.from({ length: count }, (_, k) => k)): void {

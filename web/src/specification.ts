@@ -39,24 +39,36 @@ function mark(met: boolean): HTMLElement {
   return h("span", { class: "mark", role: "img", "aria-label": met ? "met" : "missed" }, met ? "✓" : "✗");
 }
 
+/** The model of the figures of a part. */
+export const FRAMES = "frames, 8 elements in each strut";
+
+/** A column of figures: an output, in a model. */
+export interface FigureColumn { title: string; row: PartFigures }
+
+/** One column for each output in each model. */
+export function figureColumns(models: [title: string, figures: PartFigures[]][]): FigureColumn[] {
+  return models.flatMap(([title, figures]) => {
+    const sameCase = figures.every((row) => row.case === figures[0]!.case);
+    return figures.map((row) => ({ row, title: figures.length === 1 ? title : [...(sameCase ? [] : [row.case]), row.output, title].join(", ") }));
+  });
+}
+
 /** Motion, off-axis motion, rotation and load of each output, always beside each other. */
-export function figureTable(figures: PartFigures[], titles: string[] | null = null): HTMLElement {
-  const several = figures.length > 1;
-  const sameCase = figures.every((row) => row.case === figures[0]!.case);
+export function figureTable(columns: FigureColumn[]): HTMLElement {
   const rows: [string, (row: PartFigures) => string][] = [
     ["output / input motion", (row) => figure(row.efficiency, 2)],
     ["motion of the output", (row) => unit(row.travel_mm, 2, "mm")],
-    ["off-axis motion", (row) => (row.off_axis == null ? "–" : `${figure(100 * row.off_axis, 1)} %`)],
+    ["off-axis motion", (row) => (row.off_axis == null ? "–" : `${figure(100 * row.off_axis, 1)} %${row.travel_mm == null ? "" : ` (${figure(row.off_axis * Math.abs(row.travel_mm), 2)} mm)`}`)],
     ["rotation of the output", (row) => unit(row.rotation_deg, 1, "°")],
-    ["payload: load that halves the motion", (row) => (row.payload_N == null ? "none" : `${figure((1000 * row.payload_N) / 9.80665, 0)} g`)],
+    ["payload that halves the motion", (row) => (row.payload_N === undefined ? "–" : row.payload_N === null ? "none" : `${figure((1000 * row.payload_N) / 9.80665, 0)} g (${figure(row.payload_N, 3)} N)`)],
     ["sag under own weight", (row) => unit(row.sag_mm, 2, "mm")],
     ["largest input force", (row) => unit(row.largest_input_force_N, 2, "N")],
     ["largest strain", (row) => (row.strain == null ? "–" : `${figure(100 * row.strain, 1)} %`)],
   ];
   return h("table", { class: "figures part" },
-    h("caption", {}, "Figures of the part, by frames with 8 elements in each strut"),
-    several && h("thead", {}, h("tr", {}, h("td"), ...figures.map((row, k) => h("th", { scope: "col" }, titles?.[k] ?? (sameCase ? [row.output] : [row.case, row.output]).filter((name) => name !== "case").join(", "))))),
-    h("tbody", {}, ...rows.map(([name, text]) => h("tr", {}, h("th", { scope: "row" }, name), ...figures.map((row) => h("td", {}, text(row)))))));
+    h("caption", {}, "Figures of the part at full stroke; off-axis motion and rotation are the largest along it"),
+    h("thead", {}, h("tr", {}, h("td"), ...columns.map(({ title }) => h("th", { scope: "col" }, title)))),
+    h("tbody", {}, ...rows.map(([name, text]) => h("tr", {}, h("th", { scope: "row" }, name), ...columns.map(({ row }) => h("td", {}, text(row)))))));
 }
 
 function unit(value: number | null | undefined, digits: number, name: string): string {

@@ -267,7 +267,7 @@ def _saver(path: Path | None, *, required: bool) -> Callable[[Validation], None]
             notes.print(f"[yellow]record not written:[/] {plain(error)}")
             return
         complete = len(validation.analyses) == len(validation.plan)
-        if complete and bool(validation.items) == validation.has_items:
+        if complete and bool(validation.figures) == validation.has_items:
             notes.print(f"wrote {plain(path)}")
 
     return save
@@ -277,6 +277,7 @@ def _print(validation: Validation) -> None:
     """Print the figures of each level in a table, one column for each."""
     from bellcrank.mechanics import objective_name
     from bellcrank.workflows.figures import model_words
+    from bellcrank.workflows.report_tables import figure_table_by_model
     from bellcrank.workflows.specification import item_rows
 
     table = Table(box=SIMPLE)
@@ -302,6 +303,7 @@ def _print(validation: Validation) -> None:
     if validation.items:
         rows = item_rows(validation.design.problem, validation.spec, validation.items)
         results.print(text_grid(rows))
+        results.print(text_grid(figure_table_by_model(validation.figures)))
     for doubt in validation.doubts:
         notes.print(f"[yellow]design:[/] {plain(doubt)}")
     for analysis in validation.analyses:

@@ -95,6 +95,7 @@ def sheet_records(
     report: Callable[[str, float], None] = lambda _case, _load: None,
     fineness: Fineness = FINE,
     mesh: ContinuumMesh | None = None,
+    quantities: Sequence[str] = (),
 ) -> dict[str, StrokeRecord] | None:
     """Return the channels of the items and objectives of a part in the sheet, by load case.
 
@@ -115,6 +116,8 @@ def sheet_records(
         Mesh of another outline with the same ports; that of the struts by default. The part then
         gives the problem and the material only, and a bound on the clearance of its struts has no
         meaning.
+    quantities
+        Names of quantities that are recorded for each output besides items and objectives.
 
     Returns
     -------
@@ -134,7 +137,8 @@ def sheet_records(
     records = {}
     control = ROUGH_STEPS if fineness is COARSE else STEPS
     for name in part.design.problem.cases:
-        record = _Sheet(part, mesh, name, wanted, control).record(partial(report, name))
+        sheet = _Sheet(part, mesh, name, wanted, control)
+        record = sheet.record(partial(report, name), quantities)
         if record is None:
             return None
         records[name] = record
@@ -164,16 +168,23 @@ class _Sheet:
         self.weight = wanted.weight
         self.force_unit = part.stiffness_unit * part.scale
 
-    def record(self, report: Callable[[float], None]) -> StrokeRecord | None:
-        """Return the channels that the items need; None without a stable path."""
+    def record(
+        self, report: Callable[[float], None], quantities: Sequence[str] = ()
+    ) -> StrokeRecord | None:
+        """Return the channels that items, objectives and further quantities of all outputs need.
+
+        None without a stable path.
+        """
         main = self._path(lambda state: report(state.load))
         if main is None:
             return None
         ends = [end for item in self.items for end in (item.start, item.stop) if end > 0.0]
         kinks = self.case.input.kinks
         fractions = np.unique(np.concatenate([np.arange(1, STATES + 1) / STATES, ends, kinks]))
-        wanted: list[Item | ObjectiveTerm] = [*self.items, *self.objectives]
-        needed = [channel for each in wanted for channel in channels_of(each.quantity, each.output)]
+        items: list[Item | ObjectiveTerm] = [*self.items, *self.objectives]
+        wanted = [(each.quantity, each.output) for each in items]
+        wanted += [(quantity, output) for output in self.case.outputs for quantity in quantities]
+        needed = [channel for each in wanted for channel in channels_of(*each)]
         channels = {
             channel: self._channel(channel, main, fractions) for channel in dict.fromkeys(needed)
         }

@@ -206,7 +206,7 @@ async def follow(socket: WebSocket, name: str, state: State) -> None:
     loading = asyncio.create_task(_load_curves(state, job))
     try:
         seen: dict[int, int] = {}
-        epoch, changed = -1, -1
+        epoch, changed, moved = -1, -1, None
         while not closed.done():
             if job.changed != changed:
                 changed = job.changed
@@ -214,6 +214,9 @@ async def follow(socket: WebSocket, name: str, state: State) -> None:
                 if reset:
                     epoch, seen = job.curves.epoch, {}
                 message = _live_state(state, job, job.curves.since(seen), reset=reset)
+                # The displayed design has some ten kilobytes: it is sent when it is another one.
+                message["moved"] = None if job.moved is moved else job.moved
+                moved = job.moved
                 await socket.send_text(json.dumps(message, separators=(",", ":")))
             await asyncio.wait([closed], timeout=INTERVAL)
     except (WebSocketDisconnect, RuntimeError):
@@ -265,5 +268,4 @@ def _live_state(
         "left": progress.get("left"),
         "tried": progress.get("tried"),
         "refined": progress.get("refined"),
-        "moved": job.moved,
     }

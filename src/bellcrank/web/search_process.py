@@ -25,9 +25,11 @@ if TYPE_CHECKING:
     from collections.abc import Collection
     from multiprocessing.connection import Connection
 
-    from bellcrank.model import Design
+    from bellcrank.mechanics import Response
+    from bellcrank.model import Design, Problem
+    from bellcrank.part import PartSpec
     from bellcrank.refine.refinement import Progress as RefinementProgress
-    from bellcrank.search import Progress, SearchSettings
+    from bellcrank.search import Progress, SearchSettings, SpecificationEvaluator
     from bellcrank.storage import RunFolder
     from bellcrank.web.curves import Point
 
@@ -82,6 +84,7 @@ class ProgressReporter:
         self._specification = specification_of(folder.problem)
         self._evaluator = self._specification or model_evaluator(folder.problem)
         self._part = PartSpec.from_dict(folder.provenance.get("part") or {}, "part")
+        self._refinement = RefinementDisplay(self._part)
         self._total = settings.chains * settings.steps
         self._chain_count = settings.chains
         self._lock = threading.Lock()
@@ -93,7 +96,6 @@ class ProgressReporter:
         self._moved_at, self._moved_mask = 0.0, ""
         self._tried: tuple[int, int] | None = None
         self._refined: dict[int, RefinementProgress] = {}
-        self._best_refined: dict[int, RefinementProgress] = {}
         self._done = {chain: folder.progress(chain)[0] for chain in range(settings.chains)}
         self._points.update(self._first_points(settings))
         self._end = threading.Event()
@@ -144,14 +146,9 @@ class ProgressReporter:
 
     def refining(self, number: int, progress: RefinementProgress) -> None:
         """Record the progress of the refinement of a design."""
-        from bellcrank.refine.by_frames import MET
-
         with self._lock:
             self._refined[number] = progress
-            best = self._best_refined.get(number)
-            is_better = best is None or progress.rows.objective > best.rows.objective
-            if progress.rows.violation <= MET and is_better:
-                self._best_refined[number] = progress
+            self._refinement.add(number, progress)
 
     def _most_geometries(self, designs: int) -> int:
         """Return the usual number of geometries of all refinements, of the first and further ones.
@@ -167,8 +164,7 @@ class ProgressReporter:
     def refined_designs(self) -> list[Design]:
         """Return the best design of each refinement that meets all items, the best first."""
         with self._lock:
-            found = sorted(self._best_refined.values(), key=lambda each: -each.rows.objective)
-        return [each.design for each in found if each.design is not None]
+            return self._refinement.designs()
 
     def _send_regularly(self) -> None:
         while not self._end.wait(INTERVAL):
@@ -185,6 +181,7 @@ class ProgressReporter:
             chains = {chain: self._whole(state) for chain, state in self._chains.items()}
             done, made, tried = sum(self._done.values()), self._made, self._tried
             refined, scores = dict(self._refined), dict(self._scores)
+            shape = self._refinement.design
         speed = made / max(time.monotonic() - self._start, 1e-9)
         message: dict[str, Any] = {
             "kind": "progress",
@@ -198,7 +195,11 @@ class ProgressReporter:
             "refined": _refinement_of(refined.values(), self._most_geometries(len(refined))),
         }
         best = chains[max(scores, key=scores.__getitem__)]
-        if time.monotonic() - self._moved_at > MOVED_INTERVAL and best["kept"] != self._moved_mask:
+        if shape is not None:
+            message |= self._refinement.message(shape)
+        elif (
+            time.monotonic() - self._moved_at > MOVED_INTERVAL and best["kept"] != self._moved_mask
+        ):
             message["moved"] = self._move(best["kept"])
         self._pipe.send(message)
 
@@ -213,24 +214,85 @@ class ProgressReporter:
 
     def _move(self, mask: str) -> dict[str, Any]:
         """Return the response of the displayed design."""
-        from bellcrank.fem.results import finite
-        from bellcrank.web.items import item_states, objective_states
-        from bellcrank.web.quick_calls import flat
-
         bits = unpack_mask(mask, self._problem.lattice.beam_count)
         response = self._evaluator.evaluate(bits)
         self._moved_at, self._moved_mask = time.monotonic(), mask
-        shown, items, objectives = response.is_admissible, None, []
-        if shown and self._specification is not None:
-            items = item_states(self._problem, self._part, self._specification.results())
-            objectives = objective_states(self._problem, self._part, self._specification)
-        return {
-            "mask": mask,
-            "efficiency": finite(response.efficiency),
-            "displacement": flat(response.displacement) if shown else None,
-            "items": items,
-            "objectives": objectives,
-        }
+        shown = displayed(self._problem, self._part, response, self._specification)
+        return {"mask": mask, "problem": None, **shown}
+
+
+class RefinementDisplay:
+    """The best geometries of refinements, and the best of all for the page.
+
+    Attributes
+    ----------
+    design
+        The design that is shown; None before the first geometry that meets all items.
+    """
+
+    def __init__(self, part: PartSpec, *, only_met: bool = True) -> None:
+        self.design: Design | None = None
+        self._part, self._only_met = part, only_met
+        self._best: dict[int, RefinementProgress] = {}
+        self._sent: Design | None = None
+        self._sent_at = 0.0
+
+    def add(self, number: int, progress: RefinementProgress) -> None:
+        """Record a geometry of the refinement of a design."""
+        from bellcrank.refine.by_frames import MET
+
+        if progress.design is None:
+            return
+        if progress.rows.violation > MET:
+            if not self._only_met and not self._best:
+                self.design = progress.design
+            return
+        best = self._best.get(number)
+        if best is None or progress.rows.objective > best.rows.objective:
+            self._best[number] = progress
+            self.design = self.designs()[0]
+
+    def designs(self) -> list[Design]:
+        """Return the best design of each refinement that meets all items, the best first."""
+        found = sorted(self._best.values(), key=lambda each: -each.rows.objective)
+        return [each.design for each in found if each.design is not None]
+
+    def message(self, design: Design) -> dict[str, Any]:
+        """Return the response of a design for the page; empty if it was sent, or too soon."""
+        from bellcrank.model import problem_to_dict
+        from bellcrank.web.quick_calls import specification_of
+
+        if design is self._sent or time.monotonic() - self._sent_at < MOVED_INTERVAL:
+            return {}
+        evaluator = specification_of(design.problem)
+        assert evaluator is not None
+        shown = displayed(design.problem, self._part, evaluator.evaluate(design.mask), evaluator)
+        self._sent, self._sent_at = design, time.monotonic()
+        problem = problem_to_dict(design.problem)
+        return {"moved": {"mask": design.mask_hex, "problem": problem, **shown}}
+
+
+def displayed(
+    problem: Problem,
+    part: PartSpec,
+    response: Response,
+    specification: SpecificationEvaluator | None,
+) -> dict[str, Any]:
+    """Return motion, items and objectives of the design evaluated last for the page."""
+    from bellcrank.fem.results import finite
+    from bellcrank.web.items import item_states, objective_states
+    from bellcrank.web.quick_calls import flat
+
+    shown, items, objectives = response.is_admissible, None, []
+    if shown and specification is not None:
+        items = item_states(problem, part, specification.results())
+        objectives = objective_states(problem, part, specification)
+    return {
+        "efficiency": finite(response.efficiency),
+        "displacement": flat(response.displacement) if shown else None,
+        "items": items,
+        "objectives": objectives,
+    }
 
 
 def _refinement_of(latest: Collection[RefinementProgress], most: int) -> dict[str, Any] | None:
@@ -335,6 +397,7 @@ def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[st
     """Refine the initial design of a job, and write the result as that of a search."""
     from bellcrank.fem.results import finite
     from bellcrank.model import Design, read_problem, write_design
+    from bellcrank.part import PartSpec
     from bellcrank.refine import RefinementSettings
     from bellcrank.workflows.refinement import refine_file
 
@@ -342,13 +405,17 @@ def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[st
     problem = read_problem(where / "problem.json")
     design = Design(problem, problem.initial, provenance={"part": job["part"]})
     total = job["settings"]["steps"]
+    display = RefinementDisplay(PartSpec.from_dict(job["part"] or {}, "part"), only_met=False)
 
     def report(progress: RefinementProgress) -> bool:
+        display.add(0, progress)
         message = {
             "kind": "progress", "points": {}, "chains": {}, "speed": None, "left": None,
             "done": progress.evaluations, "total": total, "tried": None,
             "refined": _refinement_of([progress], total),
         }  # fmt: skip
+        if display.design is not None:
+            message |= display.message(display.design)
         with contextlib.suppress(OSError, BrokenPipeError):
             pipe.send(message)
         return not listener.stop.is_set()
@@ -361,7 +428,8 @@ def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[st
     write_design(result, where / "run" / "design.json", overwrite=True)
     message = "" if found.improved else f"the design was not improved: {found.reason}"
     efficiency = None if result.efficiency is None else finite(result.efficiency)
-    return {"kind": "finished", "efficiency": efficiency, "message": message}
+    kind = "stopped" if listener.stop.is_set() else "finished"
+    return {"kind": kind, "efficiency": efficiency, "message": message}
 
 
 def _start_or_reopen(where: Path) -> RunFolder:

@@ -33,6 +33,8 @@ MOVIE_SECONDS = 4.0
 MOVIE_SIZE = (1280, 720)
 GIF_SIZE = (720, 404)
 GIF_FPS = 20
+BODIES = {"plane": "sheet", "solid": "solid"}
+"""Names of the models of the printed body in which a specification is computed, by level."""
 MAX_VERTICES = 60_000
 """Largest number of vertices of a picture of stress."""
 
@@ -225,13 +227,16 @@ def validation(text: str, mask: str, part: dict[str, Any], level: str) -> dict[s
     -------
     dict
         Results of one level, and ``picture``: deformed struts or triangles, in mm, with their
-        stress; in the sheet also ``items``, those of the specification.
+        stress; in the sheet, and in the solid of a part in space, also ``items``, those of the
+        specification, and ``figures`` of each output, None without a stable path.
     """
     from bellcrank.fem import FemSettings
     from bellcrank.part import PartSpec
     from bellcrank.workflows import validate
 
     spec, design = PartSpec.from_dict(part), design_of(text, mask)
+    # The specification is that of the part that is shown.
+    design = replace(design, provenance={"part": part})
     validation = validate(design, spec, [(level, FemSettings())])
     analysis = validation.analyses[0]
     data: dict[str, Any] = validation.to_dict()["results"][0]
@@ -249,17 +254,14 @@ def validation(text: str, mask: str, part: dict[str, Any], level: str) -> dict[s
         "principal_strain", "input_force_N", "input_push_N", "mean_output_displacement_mm",
         "warnings", "discrete_model",
     )  # fmt: skip
-    items = None
-    if level == "plane" and design.problem.is_specified:
-        from bellcrank.fem.specification import sheet_items
-
-        results = sheet_items(spec.of(design))
-        items = None if results is None else item_states(design.problem, spec, results)
+    results = validation.items.get(BODIES.get(level, ""))
+    items = None if results is None else item_states(design.problem, spec, results)
     return {
         **{key: data[key] for key in keys},
         "doubts": validation.doubts,
         "picture": picture,
         "items": items,
+        "figures": validation.figures.get(BODIES.get(level, "")),
     }
 
 

@@ -16,7 +16,7 @@ from bellcrank.mechanics import StrokeEvaluator, model_evaluator
 from bellcrank.model import require_plane
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.part.outline import strut_outline
-from bellcrank.part.outline.grips import filled, with_pointer
+from bellcrank.part.outline.grips import filled, with_outer_rows, with_pointer
 from bellcrank.part.outline.screws import drilled, screw_positions
 from bellcrank.part.pieces import check_supported, connection_warnings
 from bellcrank.workflows.loading import loading_path
@@ -32,6 +32,11 @@ if TYPE_CHECKING:
     from bellcrank.part.outline import Outline
 
 
+ROW = 1.8
+"""Largest distance of neighbours in a row of nodes, spacings: along a side of a triangular lattice
+it is 1 or the square root of 3."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grips:
     """Additions to a part for clamping, pushing and measuring.
@@ -39,7 +44,9 @@ class Grips:
     Parameters
     ----------
     plate
-        Whether to fill the holes between supports to a plate.
+        Whether to fill the holes between supports to a plate. A single row of supports at the
+        boundary gets a plate outside of the part, wide enough for the screws; a single row of
+        input or output nodes a pad likewise.
     screws
         Number of screw holes in the plate.
     screw_diameter, wall
@@ -94,24 +101,35 @@ class Grips:
             direction = problem.output.direction[problem.output.nodes.tolist().index(node)]
             shown, drawn = with_pointer(positions, beams, node, direction, self.pointer)
             width = np.append(width, part.section.width)
+        blocks = {
+            name: nodes
+            for name, wanted, nodes in (
+                ("plate", self.plate, problem.supports.nodes),
+                ("pad", self.pad, problem.input.nodes),
+                ("output pad", self.output_pad, problem.output.nodes),
+            )
+            if wanted
+        }
+        depth = max(self.screw_diameter + 2.0 * self.wall, part.section.width)
+        for name, nodes in blocks.items():
+            shown, drawn, blocks[name] = with_outer_rows(
+                shown, drawn, nodes, depth + part.section.width, ROW * part.scale
+            )
+            more = np.full(len(drawn) - len(width), part.section.width)
+            width = np.append(width, more)
         outline = strut_outline(shown, drawn, width, fillet)
-        for name, wanted, nodes in (
-            ("plate", self.plate, problem.supports.nodes),
-            ("pad", self.pad, problem.input.nodes),
-            ("output pad", self.output_pad, problem.output.nodes),
-        ):
-            if not wanted:
-                continue
+        for name, nodes in blocks.items():
             solid = filled(outline, shown, drawn, nodes, width)
             if self.strict and solid.hole_count == outline.hole_count:
                 raise InvalidSettings(
-                    f"{name}: no hole lies between struts that join its nodes only, so that there "
-                    "is nothing to fill; select nodes of two rows, which enclose triangles"
+                    f"{name}: no hole lies between struts that join its nodes only, and its nodes "
+                    "are no row at the boundary of the part; select nodes of two rows, or of one "
+                    "row at the boundary"
                 )
             outline = solid
         if self.screws:
             points = screw_positions(
-                outline, shown, problem.supports.nodes, self.screws, self.screw_diameter, self.wall
+                outline, shown, blocks["plate"], self.screws, self.screw_diameter, self.wall
             )
             outline = drilled(outline, points, self.screw_diameter, self.wall)
         return outline

@@ -13,12 +13,15 @@ from bellcrank.mechanics import (
     CaseEvaluator,
     Channel,
     Status,
+    StrokeRecord,
 )
 from bellcrank.mechanics.frames.analysis import strain_amplitude
 from bellcrank.mechanics.frames.case import with_output, with_payload
 from bellcrank.task import units_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from bellcrank.model import Design, Problem
@@ -27,6 +30,8 @@ if TYPE_CHECKING:
 
     Values = NDArray[np.float64]
 
+SHEET_QUANTITIES = ("gain", "off_axis", "rotation", "input_force", "strain", "stiffness")
+"""Quantities of the figures in the sheet."""
 STATES = 16
 """Number of states along the stroke."""
 PAYLOAD_TRIALS = 12
@@ -91,6 +96,59 @@ def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> li
     return rows
 
 
+def sheet_figures(
+    problem: Problem, spec: PartSpec, records: Mapping[str, StrokeRecord]
+) -> list[dict[str, Any]]:
+    """Return figures of a part in the sheet, for each output of each load case.
+
+    Parameters
+    ----------
+    problem
+        Problem with a specification.
+    spec
+        Size and material of the part.
+    records
+        Channels of `SHEET_QUANTITIES` in the sheet by load case
+        (`bellcrank.fem.specification.sheet_records`).
+
+    Returns
+    -------
+    list of dict
+        Those of `part_figures` that follow from one path: motion, off-axis motion, rotation, input
+        force, strain and stiffness; ``sag_mm`` where the specification bounds the sag.
+    """
+    units = units_of(problem, spec)
+    return [
+        {"case": name, "output": output, **_along(records[name], output, units)}
+        for name, case in problem.cases.items()
+        for output in case.outputs
+    ]
+
+
+def _along(record: StrokeRecord, output: str, units: ProblemUnits) -> dict[str, Any]:
+    """Return the figures that follow from the channels along a stroke."""
+    motion, moved = record.of("motion", output), record.of("input_motion")
+    travel, force = motion[:, 0], record.of("input_force")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gain = travel / moved
+        off_axis = np.linalg.norm(motion[:, 1:], axis=1).max() / abs(travel[-1])
+    sag = record.channels.get(Channel("sag", output), np.array([math.nan]))[0]
+    return {
+        "efficiency": finite(gain[-1]),
+        "travel_mm": finite(units.in_part("length", travel[-1])),
+        "input_mm": finite(units.in_part("length", moved[-1])),
+        "off_axis": finite(off_axis),
+        "rotation_deg": finite(float(np.abs(record.of("rotation", output)).max())),
+        "input_force_N": finite(units.in_part("force", force[-1])),
+        "largest_input_force_N": finite(units.in_part("force", force.max())),
+        "strain": finite(record.of("strain").max()),
+        "output_stiffness_N_per_mm": finite(
+            units.in_part("stiffness", record.of("stiffness", output)[0])
+        ),
+        "sag_mm": finite(units.in_part("length", sag)),
+    }
+
+
 def _motion(evaluator: CaseEvaluator, output: str, units: ProblemUnits) -> dict[str, Any]:
     """Return the figures that follow from one response."""
     fractions = np.arange(1, STATES + 1) / STATES
@@ -101,30 +159,18 @@ def _motion(evaluator: CaseEvaluator, output: str, units: ProblemUnits) -> dict[
     shared = [Channel("input_motion"), Channel("input_force"), Channel("strain")]
     found = evaluator.values([*own, *shared], fractions.tolist())
     motion, moved = found[Channel("motion", output)], found[Channel("input_motion")]
-    travel, force = motion[:, 0], found[Channel("input_force")]
+    half = STATES // 2 - 1
     with np.errstate(divide="ignore", invalid="ignore"):
-        gain = travel / moved
-        off_axis = np.linalg.norm(motion[:, 1:], axis=1).max() / abs(travel[-1])
-    sag = found[Channel("sag", output)][0] if "sag" in names else math.nan
+        half_gain = motion[half, 0] / moved[half]
     path = units.in_part("length", 1.0) * found[Channel("displacement", output)]
+    force = found[Channel("input_force")]
     return {
-        "efficiency": finite(gain[-1]),
-        "efficiency_half": finite(gain[STATES // 2 - 1]),
-        "travel_mm": finite(units.in_part("length", travel[-1])),
-        "input_mm": finite(units.in_part("length", moved[-1])),
-        "off_axis": finite(off_axis),
-        "rotation_deg": finite(float(np.abs(found[Channel("rotation", output)]).max())),
-        "input_force_N": finite(units.in_part("force", force[-1])),
-        "largest_input_force_N": finite(units.in_part("force", force.max())),
-        "strain": finite(found[Channel("strain")].max()),
+        **_along(StrokeRecord(fractions, found), output, units),
+        "efficiency_half": finite(half_gain),
         "strain_amplitude": finite(_amplitude(evaluator, fractions)),
-        "output_stiffness_N_per_mm": finite(
-            units.in_part("stiffness", found[Channel("stiffness", output)][0])
-        ),
         "blocked_force_N": finite(
             units.in_part("force", found[Channel("blocked_force", output)][0])
         ),
-        "sag_mm": finite(units.in_part("length", sag)),
         "limit_points": limit_points(fractions, force),
         "path_mm": np.vstack([np.zeros(path.shape[1]), path]).round(4).tolist(),
     }

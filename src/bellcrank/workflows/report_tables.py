@@ -14,7 +14,7 @@ from bellcrank.workflows.specification import item_rows
 from bellcrank.workflows.tolerance import tolerance_rows, tolerance_sentence
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from bellcrank.storage import RunFolder
     from bellcrank.workflows.report import DesignReport
@@ -86,8 +86,30 @@ def figure_texts(row: Mapping[str, Any]) -> list[tuple[str, str]]:
     for label, keys, form, unit in FIGURES:
         values = [row.get(key) for key in keys]
         known = [form.format(value) if value is not None else "-" for value in values]
-        rows.append((label, f"{', '.join(known)} {unit}".rstrip()))
+        is_known = any(value is not None for value in values)
+        rows.append((label, f"{', '.join(known)} {unit}".rstrip() if is_known else "-"))
     return rows
+
+
+def figure_table_by_model(figures: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[list[str]]:
+    """Return figures of a part as rows of texts, a column for each output in each model.
+
+    Parameters
+    ----------
+    figures
+        Rows of `bellcrank.workflows.part_figures` by model.
+    """
+    rows = list(figures.values())
+    several = len(rows[0]) > 1
+    names = [
+        f"{row['case']}, {row['output']}, {model}" if several else model
+        for model, found in figures.items()
+        for row in found
+    ]
+    texts_of = [dict(figure_texts(row)) for found in rows for row in found]
+    return [["as a part", *names]] + [
+        [label, *(texts[label] for texts in texts_of)] for label, *_ in FIGURES
+    ]
 
 
 def part_figure_table(report: DesignReport) -> list[list[str]]:

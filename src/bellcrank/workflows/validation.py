@@ -13,6 +13,7 @@ from bellcrank.fem.results import finite
 from bellcrank.mechanics import (
     VERIFICATION_INCREMENT,
     Response,
+    item_results,
     model_evaluator,
     model_name,
     objective_name,
@@ -25,6 +26,7 @@ from bellcrank.provenance import provenance
 from bellcrank.search.verification import ELEMENTS
 from bellcrank.storage.locking import locked
 from bellcrank.workflows.figures import model_words
+from bellcrank.workflows.part_figures import SHEET_QUANTITIES, part_figures, sheet_figures
 from bellcrank.workflows.specification import item_data, results_for
 
 if TYPE_CHECKING:
@@ -69,6 +71,9 @@ class Validation:
         Items of the specification of the problem by model, if it has one: the model of the search,
         eight elements in each beam and, with the level ``plane``, the sheet; in space the solid
         with the level ``solid``. A model in which the part is not stable is left out.
+    figures
+        Figures of each output by model, beside these items; those of the frames are by eight
+        elements (`bellcrank.workflows.part_figures`).
     """
 
     design: Design
@@ -77,6 +82,7 @@ class Validation:
     plan: Plan
     analyses: list[Analysis]
     items: dict[str, list[ItemResult]] = field(default_factory=dict)
+    figures: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
 
     @property
     def has_items(self) -> bool:
@@ -92,7 +98,8 @@ class Validation:
         """Return the items of the specification as plain data, if there are any."""
         if not self.items:
             return {}
-        return {"specification": item_data(self.design.problem, self.spec, self.items)}
+        items = item_data(self.design.problem, self.spec, self.items)
+        return {"specification": items, "part_figures": self.figures}
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain data; the figures of the first analysis are repeated at the top."""
@@ -134,31 +141,33 @@ class Validation:
         }
 
 
-def validated_items(design: Design, spec: PartSpec, plan: Plan) -> dict[str, list[ItemResult]]:
-    """Return the items of the specification of a design by model.
+def with_specification(validation: Validation) -> Validation:
+    """Return a validation with the items of the specification and the figures of its outputs.
 
-    Empty without a specification, and for another part than the one that it was written for.
-
-    Parameters
-    ----------
-    design, spec, plan
-        As in `validate`; the sheet is computed if the plan has the level ``plane``, the solid of a
-        part in space if it has the level ``solid``.
+    Unchanged without a specification, and for another part than the one that it was written for.
+    The sheet is computed if the plan has the level ``plane``, the solid of a part in space if it
+    has the level ``solid``.
     """
-    problem = design.problem
-    if not problem.is_specified or spec != spec_for(design):
-        return {}
+    if not validation.has_items:
+        return validation
+    design, spec, problem = validation.design, validation.spec, validation.design.problem
     found = {
         model_words(problem, elements): results_for(problem, design.mask, elements)
         for elements in (None, ELEMENTS)
     }
+    figures = {model_words(problem, ELEMENTS): part_figures(design, spec, ELEMENTS)}
     wanted, name = {2: ("plane", "sheet"), 3: ("solid", "solid")}[problem.lattice.dimension]
-    sizes = [settings.size for level, settings in plan if level == wanted]
+    sizes = [settings.size for level, settings in validation.plan if level == wanted]
     if sizes:
-        from bellcrank.fem.specification import sheet_items
+        from bellcrank.fem.specification import sheet_records
 
-        found[name] = sheet_items(spec.of(design), sizes[0])
-    return {model: items for model, items in found.items() if items is not None}
+        assert problem.specification is not None
+        records = sheet_records(spec.of(design), sizes[0], quantities=SHEET_QUANTITIES)
+        if records is not None:
+            found[name] = item_results(problem.specification.items, records)
+            figures[name] = sheet_figures(problem, spec, records)
+    items = {model: each for model, each in found.items() if each is not None}
+    return replace(validation, items=items, figures=figures)
 
 
 def problem_identity(design: Design) -> str:
@@ -298,9 +307,8 @@ def validate(
         )
         validation = replace(validation, analyses=[*validation.analyses, analysis])
         save(validation)
-    items = validated_items(design, spec, plan)
-    if items:
-        validation = replace(validation, items=items)
+    if validation.has_items:
+        validation = with_specification(validation)
         save(validation)
     return validation
 

@@ -12,7 +12,7 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.model import find_problem, human_design
 from bellcrank.part import PartSpec
 from bellcrank.part.outline import Loop, Outline, room_for_fillet, strut_outline
-from bellcrank.part.outline.grips import filled, with_pointer
+from bellcrank.part.outline.grips import filled, with_outer_rows, with_pointer
 from bellcrank.part.outline.screws import clearance, drilled, screw_positions
 from tests.part.outline.layouts import random_layout, triangular
 
@@ -84,6 +84,37 @@ def test_supports_of_the_crane_become_a_plate_for_screws() -> None:
     assert screwed.hole_count == plate.hole_count + 2
     assert screwed.area == pytest.approx(plate.area - 2.0 * math.pi * 1.6**2)
     assert screwed.polygon(1e-3).is_valid
+
+
+def test_a_row_of_nodes_at_the_boundary_gets_a_plate_outside_of_the_part() -> None:
+    positions, beams = triangular(6, 4)
+    bottom = np.flatnonzero(np.asarray(positions)[:, 1] < 1e-9).tolist()
+    whole, struts, block = with_outer_rows(positions, beams, bottom, depth=6.0, reach=18.0)
+    added = whole[len(positions) :]
+    assert added[:, 1] == pytest.approx(np.full(len(bottom), -6.0))
+    assert sorted(added[:, 0]) == pytest.approx(sorted(np.asarray(positions)[bottom, 0]))
+    width = np.full(len(struts), 2.0)
+    # A wide strut rounds its node; the plate is closed there, too.
+    width[
+        [k for k, pair in enumerate(struts) if (pair[0] in bottom) != (pair[1] in bottom)][:3]
+    ] = 5
+    outline = strut_outline(whole, struts, width, 0.2)
+    plate = filled(outline, whole, struts, block, width)
+    holes = strut_outline(positions, beams, 2.0, 0.2).hole_count
+    assert plate.hole_count == holes
+    low, high = whole[block].min(axis=0), whole[block].max(axis=0)
+    grid = np.stack(np.meshgrid(*np.linspace(low, high, 40).T), axis=-1).reshape(-1, 2)
+    assert (clearance(plate, grid) > 0.5).all()
+
+
+def test_nodes_inside_of_a_part_or_in_several_rows_get_no_row() -> None:
+    positions, beams = triangular(6, 4)
+    heights = np.unique(np.round(np.asarray(positions)[:, 1], 6))
+    middle = np.flatnonzero(np.isclose(np.asarray(positions)[:, 1], heights[2]))
+    two = np.flatnonzero(np.asarray(positions)[:, 1] < heights[1] + 1.0)
+    for nodes in (middle, two, [0]):
+        whole, struts, block = with_outer_rows(positions, beams, nodes, depth=6.0, reach=18.0)
+        assert (len(whole), len(struts), len(block)) == (len(positions), len(beams), len(nodes))
 
 
 def test_drilled_holes_are_circles_that_run_clockwise() -> None:

@@ -7,6 +7,7 @@ additional strut at the output makes its motion visible. Lines and arcs remain e
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 _CLOSE = 1e-6
 """Relative tolerance of equal distances."""
+_STRAIGHT = 1e-3
+"""Width of a row of nodes on a line over its length."""
 
 
 def filled(
@@ -34,7 +37,7 @@ def filled(
 ) -> Outline:
     """Return an outline without the holes between given nodes.
 
-    A hole is filled, with its content, if every strut around it connects two of the nodes.
+    A hole is filled, with its content, if every strut along it connects two of the nodes.
 
     Parameters
     ----------
@@ -71,10 +74,12 @@ def filled(
     block = read_nodes(nodes, len(places))
     if not outline.holes:
         return outline
-    inner = np.all(np.isin(pairs, block), axis=1)
+    ends = np.isin(pairs, block)
+    inner = np.all(ends, axis=1)
     probes = [_probes(hole) for hole in outline.holes]
     hole = np.repeat(np.arange(len(probes)), [len(probe) for probe in probes])
-    points = shapely.points(np.concatenate(probes))
+    corners = np.concatenate(probes)
+    points = shapely.points(corners)
     tree = shapely.STRtree(shapely.linestrings(places[pairs]))
     half = 0.5 * read_widths(width, len(pairs))
     _, nearest = tree.query_nearest(points, all_matches=False, return_distance=True)
@@ -84,9 +89,108 @@ def filled(
     least = np.full(len(points), np.inf)
     np.minimum.at(least, probe, beyond)
     bounds = beyond <= least[probe] + _CLOSE * distance
+    # A strut that leaves the block bounds its holes next to its node where it is wide.
+    chord = places[pairs[strut, 1]] - places[pairs[strut, 0]]
+    length = np.linalg.norm(chord, axis=1)
+    along = ((corners[probe] - places[pairs[strut, 0]]) * chord).sum(axis=1) / length
+    at_node = ((along <= half[strut]) & ends[strut, 0]) | (
+        (along >= length - half[strut]) & ends[strut, 1]
+    )
     gone = np.ones(len(probes), dtype=np.bool_)
-    gone[hole[probe[bounds & ~inner[strut]]]] = False
+    gone[hole[probe[bounds & ~inner[strut] & ~at_node]]] = False
     return _without_holes(outline, gone)
+
+
+def with_outer_rows(
+    positions: ArrayLike, beams: ArrayLike, nodes: ArrayLike, depth: float, reach: float
+) -> tuple[Reals, Ids, Ids]:
+    """Return nodes and beams with a row of nodes outside of each row of given nodes.
+
+    Nodes in a row at the boundary enclose no holes. A second row of nodes outside, joined to them
+    by struts, encloses holes that `filled` makes a plate. Rows are of two or more nodes on a line;
+    a row with struts on both sides gets none.
+
+    Parameters
+    ----------
+    positions : (N, 2) array_like, mm
+        Nodes.
+    beams : (M, 2) array_like of int
+        The two nodes of each strut.
+    nodes : (k,) array_like of int
+        Nodes of the block, for example all supports.
+    depth : float, mm
+        Distance of the new rows.
+    reach : float, mm
+        Largest distance of neighbours in a row.
+
+    Returns
+    -------
+    (N + n, 2) float64, mm, and (M + m, 2) int64
+        Arguments for `strut_outline`.
+    (k + n,) int64
+        Nodes of the block with the new ones.
+
+    Raises
+    ------
+    InvalidSettings
+        If a node does not exist.
+
+    Examples
+    --------
+    >>> positions, beams, block = with_outer_rows(
+    ...     [[0, 0], [10, 0], [5, 8]], [[0, 2], [1, 2]], [0, 1], depth=6.0, reach=12.0
+    ... )
+    >>> positions[3:].tolist(), block.tolist()
+    ([[0.0, -6.0], [10.0, -6.0]], [0, 1, 3, 4])
+    >>> beams[2:].tolist()
+    [[0, 1], [0, 3], [1, 4], [3, 4], [0, 4]]
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    places, pairs = np.asarray(positions, dtype=np.float64), np.asarray(beams, dtype=np.int64)
+    block = read_nodes(nodes, len(places))
+    apart = np.linalg.norm(places[block][:, None] - places[block], axis=2)
+    count, row_of = connected_components(apart <= reach, directed=False)
+    known = {tuple(sorted(pair)) for pair in pairs.tolist()}
+    used, whole = np.unique(pairs), places
+    added: list[list[int]] = []
+    for row in range(count):
+        line = _outer_line(places, used, block[row_of == row], depth)
+        if line is None:
+            continue
+        own, outward = line
+        first = len(whole)
+        whole = np.vstack([whole, places[own] + depth * outward])
+        new = list(range(first, len(whole)))
+        block = np.concatenate([block, new])
+        added += [[a, b] for a, b in pairwise(own.tolist()) if (min(a, b), max(a, b)) not in known]
+        added += [[a, b] for a, b in zip(own.tolist(), new, strict=True)]
+        added += [[a, b] for a, b in pairwise(new)]
+        added += [[a, b] for a, b in zip(own.tolist(), new[1:], strict=False)]
+    return whole, np.vstack([pairs, np.array(added, dtype=np.int64).reshape(-1, 2)]), block
+
+
+def _outer_line(places: Reals, used: Ids, nodes: Ids, depth: float) -> tuple[Ids, Reals] | None:
+    """Return nodes in their order on a line, and the side on which there are no other nodes.
+
+    None if they are not on a line, or there are nodes on both sides within twice the depth.
+    """
+    if len(nodes) < 2:
+        return None
+    centre = places[nodes].mean(axis=0)
+    _, sizes, axes = np.linalg.svd(places[nodes] - centre)
+    if sizes[1] > _STRAIGHT * sizes[0]:
+        return None
+    along, across = axes
+    order = nodes[np.argsort(places[nodes] @ along)]
+    others = places[np.setdiff1d(used, nodes)] - centre
+    low, high = np.ptp(places[nodes] @ along) * np.array([-0.5, 0.5])
+    within = (others @ along > low - depth) & (others @ along < high + depth)
+    for outward in (across, -across):
+        height = others[within] @ outward
+        if not ((height > 0.0) & (height < 2.0 * depth)).any():
+            return order, outward
+    return None
 
 
 def with_pointer(
