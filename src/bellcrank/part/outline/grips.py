@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _CLOSE = 1e-6
 """Relative tolerance of equal distances."""
-_STRAIGHT = 1e-3
+_ROW_WIDTH = 1e-3
 """Width of a row of nodes on a line over its length."""
 
 
@@ -179,7 +179,7 @@ def _outer_line(places: Reals, used: Ids, nodes: Ids, depth: float) -> tuple[Ids
         return None
     centre = places[nodes].mean(axis=0)
     _, sizes, axes = np.linalg.svd(places[nodes] - centre)
-    if sizes[1] > _STRAIGHT * sizes[0]:
+    if sizes[1] > _ROW_WIDTH * sizes[0]:
         return None
     along, across = axes
     order = nodes[np.argsort(places[nodes] @ along)]
