@@ -14,7 +14,7 @@ from bellcrank.cli import main
 from bellcrank.cli.app import NOT_MET
 from bellcrank.model import human_design, read_design, write_design
 from bellcrank.part.units import GRAVITY
-from benchmarks.task_figures import table
+from benchmarks.task_figures import carried, table
 from tools.draw_tasks import identity, recorded_runs
 
 README = Path(__file__).parents[2] / "README.md"
@@ -165,6 +165,10 @@ def test_the_table_of_tasks_is_that_of_the_record_of_the_recorded_designs() -> N
     text = README.read_text(encoding="utf-8")
     rows = re.findall(r"^\| `[\w-]+` \| [\d–].*$", text, re.MULTILINE)
     assert rows == table(record)
+    sentence = "{} tasks ask for a payload, and {} parts carry it as a dead load"
+    for page in (README, README.parent / "docs" / "tasks.md"):
+        text = " ".join(page.read_text(encoding="utf-8").split())
+        assert sentence.format(*carried(record)) in text
     runs = recorded_runs()
     for each in record:
         designs = {identity(run): run["met"] for run in runs if run["task"] == each["task"]}

@@ -33,7 +33,7 @@ TASK = {
             "outputs": [
                 {"name": "tip", "at": {"edge": "top", "between": [0, 16]}, "direction": "right",
                  "gain": {"at_least": 0.1}, "off_axis": 2, "rotation": "40 deg", "sag": 2,
-                 "payload": "1 g", "stiffness": "0.001 N/mm", "blocked_force": "1 mN",
+                 "payload": "1 g", "dead_load": "1 g", "stiffness": "0.001 N/mm", "blocked_force": "1 mN",
                  "path": {"points": [[0, 0], [2, 0]], "error": "50%"}},
                 {"name": "side", "at": {"point": [41, 27]}, "direction": "right",
                  "travel": "0.01 mm", "rotation": "40 deg"},

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bellcrank.mechanics import CaseEvaluator, Channel, FrameEvaluator
-from bellcrank.mechanics.frames.case import CHANNELS, with_payload
+from bellcrank.mechanics.frames.case import CHANNELS, LOADED, with_payload
 from bellcrank.model import (
     Loads,
     NodeSpring,
@@ -30,6 +30,11 @@ def crane(**changes: object) -> Problem:
 @pytest.fixture(scope="module")
 def mask() -> np.ndarray:
     return human_design("crane").mask
+
+
+def forces_on(*outputs: str) -> dict[Channel, float]:
+    """Return a small force on outputs, with the input and before it."""
+    return {Channel(name, output): 2e-3 for name in LOADED for output in outputs}
 
 
 def two_outputs() -> Problem:
@@ -103,7 +108,7 @@ def test_an_output_on_rollers_slides_along_them(mask: np.ndarray) -> None:
 
 def test_flips_are_predicted_for_every_channel_of_every_output(mask: np.ndarray) -> None:
     problem = two_outputs()
-    case = CaseEvaluator(problem, weight=[0.0, -1e-3], payloads={"jaw": 2e-3, "side": 2e-3})
+    case = CaseEvaluator(problem, weight=[0.0, -1e-3], forces=forces_on("jaw", "side"))
     case.respond(mask)
     channels = [
         Channel(name, output)
@@ -117,7 +122,7 @@ def test_flips_are_predicted_for_every_channel_of_every_output(mask: np.ndarray)
     after, changed, _ = case.predict_flips(before, beams)
     assert changed.any()
     errors: dict[str, list[float]] = {name: [] for name in CHANNELS}
-    other = CaseEvaluator(problem, weight=[0.0, -1e-3], payloads={"jaw": 2e-3, "side": 2e-3})
+    other = CaseEvaluator(problem, weight=[0.0, -1e-3], forces=forces_on("jaw", "side"))
     for row, beam in enumerate(beams):
         flipped = mask.copy()
         flipped[beam] ^= True
@@ -140,8 +145,8 @@ def test_flips_are_predicted_for_every_channel_of_every_output(mask: np.ndarray)
 
 def test_the_reference_of_warm_starts_includes_all_loads(mask: np.ndarray) -> None:
     problem = crane()
-    warm, cold = (CaseEvaluator(problem, payloads={"output": 2e-3}) for _ in range(2))
-    channels = [Channel("motion", "output"), Channel("loaded_motion", "output")]
+    warm, cold = (CaseEvaluator(problem, forces=forces_on("output")) for _ in range(2))
+    channels = [Channel(name, "output") for name in ("motion", *LOADED)]
     warm.respond(mask)
     warm.values(channels, [1.0])
     warm.set_reference()

@@ -29,6 +29,7 @@ RECORD = StrokeRecord(
         Channel("motion", "tip"): np.stack([ALONG, NORMAL, 0.0 * NORMAL], axis=-1),
         Channel("displacement", "tip"): np.stack([ALONG, NORMAL], axis=-1),
         Channel("loaded_motion", "tip"): np.array([[0.8, 0.0, 0.0]]),
+        Channel("carried_motion", "tip"): np.array([[-0.6, 0.0, 0.0]]),
         Channel("input_motion"): 0.5 * FRACTIONS,
         Channel("rotation", "tip"): np.array([1.0, -6.0, 2.0, 3.0]),
         Channel("input_force"): np.array([0.4, 0.9, -0.2, 0.3]),
@@ -37,7 +38,7 @@ RECORD = StrokeRecord(
         Channel("sag", "tip"): np.array([0.25]),
     },
     {"clearance": math.inf, "mass": 12.0},
-    {"tip": 0.04},
+    {Channel("loaded_motion", "tip"): 0.04, Channel("carried_motion", "tip"): 0.04},
 )
 
 
@@ -58,6 +59,7 @@ def item(quantity: str, **bounds: Any) -> Item:
         (item("travel", at_least=1.2, at_most=40.0), 1.0, 0.2 / 1.2),
         (item("travel", at_least=0.0, at_most=0.8), 1.0, 0.2 / 0.8),
         (item("payload", at_least=0.2), 0.1, 0.1 / 0.2),
+        (item("dead_load", at_least=0.04), 0.0125, 0.0275 / 0.04),
         (item("sag", at_most=0.1), 0.25, 0.15 / 0.1),
         (item("input_force", of="largest", at_most=0.6, start=0.0), 0.9, 0.3 / 0.6),
         (item("input_force", of="smallest", at_most=-0.1, start=0.0), -0.2, 0.0),

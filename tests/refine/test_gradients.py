@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from bellcrank.mechanics.frames.case import CHANNELS, CaseEvaluator, Channel
+from bellcrank.mechanics.frames.case import CHANNELS, LOADED, CaseEvaluator, Channel
 from bellcrank.mechanics.frames.geometry import beam_slopes, geometry_slopes
 from bellcrank.mechanics.frames.joints import joint_lengths, joint_slopes, with_joints
 from bellcrank.mechanics.frames.quantities.forces import LOWEST_STIFFNESS
@@ -33,8 +33,9 @@ def case_of(problem: Problem, mask: np.ndarray) -> CaseEvaluator:
     """Return the response of a design, with tightly converged equilibria."""
     weight = np.zeros(problem.lattice.dimension)
     weight[-1] = -1e-3
-    case = CaseEvaluator(problem, None, weight, {"output": 1e-4})
-    frames = [case.frame, *(case.other(load, "output") for load in ("payload", "held output"))]
+    forces = dict.fromkeys((Channel(name, "output") for name in LOADED), 1e-4)
+    case = CaseEvaluator(problem, None, weight, forces)
+    frames = [case.frame, *case.loaded, case.other("held output", "output")]
     for frame in frames:
         frame.frame = replace(frame.frame, tolerance=1e-13)
     case.respond(mask)
@@ -204,6 +205,7 @@ def test_constraints_in_space_have_the_derivatives_of_differences(
         Item(quantity="off_axis", case=case, output=output, at_most=0.01),
         Item(quantity="rotation", case=case, output=output, at_most=0.01),
         Item(quantity="payload", case=case, output=output, at_least=1e-3),
+        Item(quantity="dead_load", case=case, output=output, at_least=1e-3),
         Item(quantity="sag", case=case, output=output, at_most=1e-4),
         Item(quantity="strain", case=case, at_most=1e-3),
         Item(quantity="clearance", case=case, at_least=0.1),
@@ -220,7 +222,8 @@ def test_constraints_in_space_have_the_derivatives_of_differences(
     start = 0.01 * rng.normal(size=variables.count)
     way = rng.normal(size=variables.count)
     compared = compared_rows(rows, start, way)
-    assert {"clearance", "mass", "case.output.off_axis", "case.output.payload"} <= compared
+    assert {"clearance", "mass", "case.output.off_axis"} <= compared
+    assert {"case.output.payload", "case.output.dead_load"} <= compared
 
 
 def test_the_error_of_a_path_with_a_corner_has_the_derivative_of_differences() -> None:

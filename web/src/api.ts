@@ -55,6 +55,7 @@ export interface PartFigures {
   off_axis?: number | null;
   rotation_deg?: number | null;
   payload_N?: number | null;
+  dead_load_N?: number | null;
   sag_mm?: number | null;
   largest_input_force_N?: number | null;
   strain?: number | null;

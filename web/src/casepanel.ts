@@ -19,7 +19,8 @@ const USUAL: Record<QuantityName, Usual> = {
   travel: { title: "travel, mm", bound: "at_least", example: "5 mm", about: "Motion of the output along its direction." },
   off_axis: { title: "off-axis motion", bound: "at_most", example: "10%", about: "Largest motion normal to the direction, over the travel." },
   rotation: { title: "rotation", bound: "value", example: "5 deg", about: "Rotation of the output, counter-clockwise positive." },
-  payload: { title: "payload", bound: "at_least", example: "10 g", about: "Load against the direction of the output that halves its travel." },
+  payload: { title: "payload", bound: "at_least", example: "10 g", about: "Load against the direction of the output that grows with the input, as that of a workpiece, and halves the travel." },
+  dead_load: { title: "dead load", bound: "at_least", example: "10 g", about: "Weight against the direction of the output that acts before the input, and halves the travel." },
   stiffness: { title: "stiffness", bound: "at_least", example: "0.1 N/mm", about: "Stiffness of the output along its direction at the full stroke." },
   blocked_force: { title: "blocked force", bound: "at_least", example: "0.1 N", about: "Force of the output on a stop that prevents its travel." },
   sag: { title: "sag under own weight", bound: "at_most", example: "10%", about: "Motion of the output by the own weight, over its travel." },
@@ -29,13 +30,13 @@ const INPUT_FORCE: Usual = { title: "input force", bound: "at_most", example: "1
 const ROTATION_IN_SPACE = "Size of the rotation of the output, about whatever axis it has.";
 
 /** Quantities that may be maximised. */
-const MAXIMISED: string[] = ["gain", "travel", "rotation", "payload", "stiffness", "blocked_force"];
+const MAXIMISED: string[] = ["gain", "travel", "rotation", "payload", "dead_load", "stiffness", "blocked_force"];
 
 /** Quantities that may be minimised, with a bound on the motion beside them. */
 const MINIMISED: string[] = ["off_axis", "sag"];
 
 /** What an output begins with that turns, or moves along a direction. */
-const TURN = { direction: undefined, gain: undefined, travel: undefined, off_axis: undefined, path: undefined, payload: undefined, sag: undefined, rotation: [{ maximise: true }] };
+const TURN = { direction: undefined, gain: undefined, travel: undefined, off_axis: undefined, path: undefined, payload: undefined, dead_load: undefined, sag: undefined, rotation: [{ maximise: true }] };
 const MOTION = { direction: "left", rotation: undefined, gain: [{ maximise: true }], off_axis: [{ at_most: "10%" }] };
 
 /** The panel of the inputs, outputs or loads of the shown load case. */

@@ -60,7 +60,8 @@ export function figureTable(columns: FigureColumn[]): HTMLElement {
     ["motion of the output", (row) => unit(row.travel_mm, 2, "mm")],
     ["off-axis motion", (row) => (row.off_axis == null ? "–" : `${figure(100 * row.off_axis, 1)} %${row.travel_mm == null ? "" : ` (${figure(row.off_axis * Math.abs(row.travel_mm), 2)} mm)`}`)],
     ["rotation of the output", (row) => unit(row.rotation_deg, 1, "°")],
-    ["payload that halves the motion", (row) => (row.payload_N === undefined ? "–" : row.payload_N === null ? "none" : `${figure((1000 * row.payload_N) / 9.80665, 0)} g (${figure(row.payload_N, 3)} N)`)],
+    ["payload that halves the motion: grows with the input", (row) => weight(row.payload_N)],
+    ["dead load that halves the motion: acts before the input", (row) => weight(row.dead_load_N)],
     ["sag under own weight", (row) => unit(row.sag_mm, 2, "mm")],
     ["largest input force", (row) => unit(row.largest_input_force_N, 2, "N")],
     ["largest strain", (row) => (row.strain == null ? "–" : `${figure(100 * row.strain, 1)} %`)],
@@ -69,6 +70,10 @@ export function figureTable(columns: FigureColumn[]): HTMLElement {
     h("caption", {}, "Figures of the part at full stroke; off-axis motion and rotation are the largest along it"),
     h("thead", {}, h("tr", {}, h("td"), ...columns.map(({ title }) => h("th", { scope: "col" }, title)))),
     h("tbody", {}, ...rows.map(([name, text]) => h("tr", {}, h("th", { scope: "row" }, name), ...columns.map(({ row }) => h("td", {}, text(row)))))));
+}
+
+function weight(force: number | null | undefined): string {
+  return force === undefined ? "–" : force === null ? "none" : `${figure((1000 * force) / 9.80665, 0)} g (${figure(force, 3)} N)`;
 }
 
 function unit(value: number | null | undefined, digits: number, name: string): string {

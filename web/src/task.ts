@@ -18,7 +18,7 @@ export interface Bounds {
 }
 export interface PathTable { points?: Point[]; arc?: [Amount, Amount]; error?: Amount }
 
-export const QUANTITIES = ["gain", "travel", "off_axis", "rotation", "payload", "stiffness", "blocked_force", "sag"] as const;
+export const QUANTITIES = ["gain", "travel", "off_axis", "rotation", "payload", "dead_load", "stiffness", "blocked_force", "sag"] as const;
 export type QuantityName = (typeof QUANTITIES)[number];
 
 export type OutputTable = { name?: string; at?: Region[]; direction?: Direction; spring?: Amount; path?: PathTable } & Partial<Record<QuantityName, Bounds[]>>;

@@ -22,6 +22,9 @@ from bellcrank.cli.design_report import print_report
 from bellcrank.errors import InvalidSettings
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from bellcrank.model import Design, Problem
     from bellcrank.part import PartSpec
 
@@ -174,6 +177,7 @@ def design(
             compile_ahead(task)
             folder = start_design(task, settings, out or _new_folder(task), part, refine=refine)
             _print_stroke(task, 10.0 if part is None else part.scale)
+            _print_nodes(task, 10.0 if part is None else part.scale)
         command = f"bellcrank design --resume {shlex.quote(str(folder.path))}"
         stop.hint = f"Stopped. To continue: {plain(command)}"
         with SearchProgress(read_settings(folder.settings)) as progress:
@@ -221,6 +225,34 @@ def _print_stroke(task: Problem, scale: float) -> None:
             "[yellow]note:[/] input.amount is in lattice units, not in millimetres; a displacement "
             "of more than one beam length is unusually large"
         )
+
+
+LISTED = 4
+"""Largest number of nodes that are printed one by one."""
+
+
+def _print_nodes(task: Problem, scale: float) -> None:
+    """Print the nodes of a specification, which the regions of its task select, in mm."""
+    if task.specification is None:
+        return
+
+    def text(nodes: NDArray[np.int64]) -> str:
+        places = scale * task.lattice.positions[nodes]
+        if len(places) > LISTED:
+            low, high = (_point(ends) for ends in (places.min(axis=0), places.max(axis=0)))
+            return f"{len(places)} nodes between {low} and {high}"
+        return ", ".join(map(_point, places))
+
+    for name, case in task.cases.items():
+        parts = [f"supports {text(case.supports.nodes)}", f"input {text(case.input.nodes)}"]
+        parts += [f"{output} {text(each.nodes)}" for output, each in case.outputs.items()]
+        label = f"nodes of {name}" if len(task.cases) > 1 else "nodes"
+        notes.print(f"{plain(label)}, mm: {plain('; '.join(parts))}")
+
+
+def _point(position: NDArray[np.float64]) -> str:
+    """Return the coordinates of a point as text."""
+    return f"({', '.join(f'{each:.4g}' for each in position)})"
 
 
 PAPER = {"unloaded_beams": "keep", "cost": "exponential", "schedule": "linear"}

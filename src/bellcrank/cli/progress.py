@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from bellcrank.search import SearchSettings
 
 if TYPE_CHECKING:
     from bellcrank.refine.refinement import Progress as RefinementStep
+    from bellcrank.workflows.refiners import GeometryCount
 
 VIOLATED = -50.0
 """Score below which a design violates goals."""
@@ -36,7 +38,8 @@ class SearchProgress(Live):
         self._done: dict[int, int] = {}
         self._made = self._accepted = 0
         self._temperature = 0.0
-        self._refined = 0
+        self._geometries: GeometryCount | None = None
+        self._refined = -math.inf
         self._start = time.monotonic()
         super().__init__("searching", self._total, TextColumn("left"), TimeRemainingColumn())
 
@@ -61,19 +64,24 @@ class SearchProgress(Live):
         self._show(done, total, figures, figures)
 
     def refining(self, number: int, step: RefinementStep) -> None:
-        """Show the objective of a refinement and what it violates."""
-        from bellcrank.workflows.refiners import EVALUATIONS, FIRST_EVALUATIONS
+        """Show how many geometries are refined, and the best objective that meets all items."""
+        from bellcrank.refine.by_frames import MET
+        from bellcrank.workflows.refiners import GeometryCount
 
-        total = FIRST_EVALUATIONS + EVALUATIONS
         with self._lock:
-            self._bar.update(self._task, description="refining ")
-            rows = step.rows
-            figures = f"objective {rows.objective:.3f}, violation {rows.violation:.3f}"
+            if self._geometries is None:
+                self._geometries = GeometryCount(self._chains)
+                self._bar.update(self._task, description="refining ")
+            self._geometries.add(number, step.evaluations)
+            if step.rows.violation <= MET:
+                self._refined = max(self._refined, step.rows.objective)
+            done, most = self._geometries.done, max(self._geometries.done, self._geometries.most)
+            best = f"best objective {self._refined:.3f}"
+            figures = best if math.isfinite(self._refined) else "no design meets all items yet"
             if step.sheets:
-                figures += f", sheet {step.sheets}"
-            line = f"refining design {number + 1}: step {step.step}, {figures}"
-            self._refined = max(self._refined, min(step.evaluations, total))
-            self._show(self._refined, total, figures, line)
+                figures += f", design {number + 1} in the better model"
+            line = f"refining: {done} of at most {most} geometries, {figures}"
+            self._show(done, most, figures, line)
 
     def _figures(self) -> str:
         speed = self._made / max(time.monotonic() - self._start, 1e-9)

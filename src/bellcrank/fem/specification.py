@@ -18,8 +18,9 @@ from bellcrank.fem.continuum.space_mesh import space_mesh
 from bellcrank.fem.continuum.system import continuum_system
 from bellcrank.fem.path import PathState, PathStatus, StepControl, follow_path
 from bellcrank.mechanics import Channel, StrokeRecord, channels_of, item_results
-from bellcrank.mechanics.frames.case import with_output, with_payload
+from bellcrank.mechanics.frames.case import resisting_force, with_output, with_payload
 from bellcrank.mechanics.frames.stroke import with_held_output
+from bellcrank.mechanics.items import forces_of
 from bellcrank.mechanics.output import best_fit_rotation, motion_weights
 from bellcrank.mechanics.splines import stroke_spline
 from bellcrank.search.strut_loss import StrutLosses
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from bellcrank.fem.path import EquilibriumPath
     from bellcrank.fem.results import Field
     from bellcrank.mechanics import ItemResult
-    from bellcrank.model import Item, ObjectiveTerm, Problem, Specification
+    from bellcrank.model import Item, NodeForce, ObjectiveTerm, Problem, Specification
     from bellcrank.part import Part
 
     Values = NDArray[np.float64]
@@ -165,6 +166,7 @@ class _Sheet:
         self.case = part.design.problem.cases[name]
         self.items = [item for item in wanted.items if item.case == name]
         self.objectives = [each for each in wanted.maximise if each.case == name]
+        self.forces = forces_of(self.items)
         self.weight = wanted.weight
         self.force_unit = part.stiffness_unit * part.scale
 
@@ -189,23 +191,19 @@ class _Sheet:
             channel: self._channel(channel, main, fractions) for channel in dict.fromkeys(needed)
         }
         channels = {channel: _rounded(values) for channel, values in channels.items()}
-        return StrokeRecord(fractions, channels, self._given(main), self._payloads(), kinks)
-
-    def _payloads(self) -> dict[str, float]:
-        return {
-            item.output: item.at_least
-            for item in self.items
-            if item.quantity == "payload" and item.at_least is not None
-        }
+        return StrokeRecord(fractions, channels, self._given(main), self.forces, kinks)
 
     def _part(self, problem: Problem) -> Part:
         return replace(self.part, design=replace(self.part.design, problem=problem))
 
     def _follow(
-        self, problem: Problem, report: Callable[[PathState], None] = lambda _state: None
+        self,
+        problem: Problem,
+        report: Callable[[PathState], None] = lambda _state: None,
+        dead_load: NodeForce | None = None,
     ) -> tuple[ContinuumEquations, EquilibriumPath] | None:
         """Follow a load case to the full stroke; None if stability is lost before."""
-        system = continuum_system(self._part(problem), self.mesh, LAW)
+        system = continuum_system(self._part(problem), self.mesh, LAW, dead_load=dead_load)
         equations = ContinuumEquations(system)
         path = follow_path(equations, self.control, report)
         return (equations, path) if path.status is PathStatus.CONVERGED else None
@@ -224,9 +222,9 @@ class _Sheet:
         ]
         return SheetPath(part, equations, path, states, [each.field for each in stresses])
 
-    def _last_motion(self, problem: Problem) -> Values | None:
+    def _last_motion(self, problem: Problem, dead_load: NodeForce | None = None) -> Values | None:
         """Return (N, d) the displacements at full stroke, lattice units; None without stability."""
-        found = self._follow(problem)
+        found = self._follow(problem, dead_load=dead_load)
         if found is None:
             return None
         equations, path = found
@@ -235,12 +233,12 @@ class _Sheet:
     def _channel(self, channel: Channel, main: SheetPath, fractions: Values) -> Values:
         """Return a channel at fractions of the stroke, or the one value that it has."""
         problem = with_output(self.case, channel.output) if channel.output else self.case
-        single: dict[str, Callable[[SheetPath, Problem, str], Values]] = {
+        single: dict[str, Callable[[SheetPath, Problem], Values]] = {
             "stiffness": self._stiffness, "sag": self._sag, "loaded_motion": self._loaded,
-            "blocked_force": self._blocked,
+            "carried_motion": self._carried, "blocked_force": self._blocked,
         }  # fmt: skip
         if channel.name in single:
-            return single[channel.name](main, problem, channel.output)
+            return single[channel.name](main, problem)
         values = self._along(channel, main, problem)
         return stroke_spline(main.loads, values, self.case.input.kinks, fractions)
 
@@ -286,7 +284,7 @@ class _Sheet:
             ]
         )
 
-    def _stiffness(self, main: SheetPath, problem: Problem, _output: str) -> Values:
+    def _stiffness(self, main: SheetPath, problem: Problem) -> Values:
         """Return (1,) the stiffness of the output at full stroke, lattice units."""
         output = problem.output
         force = output.direction / len(output.nodes)
@@ -297,7 +295,7 @@ class _Sheet:
         stiffness = 1.0 / compliance if compliance > 0.0 else 0.0
         return np.array([stiffness / self.part.stiffness_unit])
 
-    def _sag(self, main: SheetPath, problem: Problem, _output: str) -> Values:
+    def _sag(self, main: SheetPath, problem: Problem) -> Values:
         """Return (1,) the motion of the output by the own weight at rest, lattice units."""
         assert self.weight is not None
         weight = self.force_unit / self.part.scale**3 * self.weight
@@ -309,14 +307,23 @@ class _Sheet:
         """Return (N, d) the mean displacements of hubs, mm."""
         return hub_displacements(equations, PathState(1.0, unknowns))
 
-    def _loaded(self, _main: SheetPath, problem: Problem, output: str) -> Values:
-        """Return (1, 1 + d) the motion of the output under its payload."""
-        motion = self._last_motion(with_payload(problem, self._payloads()[output]))
+    def _loaded(self, _main: SheetPath, problem: Problem) -> Values:
+        """Return (1, 1 + d) the motion of the output under a force that grows with the input."""
+        force = self.forces[Channel("loaded_motion", next(iter(problem.outputs)))]
+        return self._means_of(self._last_motion(with_payload(problem, force)), problem)
+
+    def _carried(self, _main: SheetPath, problem: Problem) -> Values:
+        """Return (1, 1 + d) the motion of the output under a force that acts before the input."""
+        force = self.forces[Channel("carried_motion", next(iter(problem.outputs)))]
+        motion = self._last_motion(problem, resisting_force(problem, force))
+        return self._means_of(motion, problem)
+
+    def _means_of(self, motion: Values | None, problem: Problem) -> Values:
         if motion is None:
             return np.full((1, 1 + problem.lattice.dimension), np.nan)
         return self._means(motion[None], problem)
 
-    def _blocked(self, _main: SheetPath, problem: Problem, _output: str) -> Values:
+    def _blocked(self, _main: SheetPath, problem: Problem) -> Values:
         """Return (1,) the force of the output on springs that hold it, lattice units."""
         held = with_held_output(problem)
         motion = self._last_motion(held)

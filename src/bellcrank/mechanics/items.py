@@ -13,10 +13,10 @@ import numpy as np
 
 from bellcrank.mechanics.frames.case import Channel
 from bellcrank.mechanics.splines import STEPS, spline_basis
-from bellcrank.model import QUANTITIES
+from bellcrank.model import CARRIED, QUANTITIES
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -32,6 +32,7 @@ CHANNELS_OF: dict[str, tuple[str, ...]] = {
     "path_error": ("displacement",),
     "stiffness": ("stiffness",),
     "payload": ("loaded_motion", "motion"),
+    "dead_load": ("carried_motion", "motion"),
     "blocked_force": ("blocked_force",),
     "sag": ("sag", "motion"),
     "input_force": ("input_force",),
@@ -73,8 +74,8 @@ class StrokeRecord:
     given
         Values of quantities that do not follow from channels: clearance, stable stroke, strut loss,
         mass.
-    payloads
-        Forces under which the loaded motion of outputs was measured.
+    forces
+        Forces under which loaded and carried motions of outputs were measured.
     kinks
         Fractions within the stroke, among those above, at which an input starts or stops.
     """
@@ -82,7 +83,7 @@ class StrokeRecord:
     fractions: NDArray[np.float64]
     channels: Mapping[Channel, Values]
     given: Mapping[str, Values | float] = field(default_factory=dict)
-    payloads: Mapping[str, float] = field(default_factory=dict)
+    forces: Mapping[Channel, float] = field(default_factory=dict)
     kinks: tuple[float, ...] = ()
 
     def of(self, name: str, output: str = "") -> Values:
@@ -100,6 +101,22 @@ def channels_of(quantity: str, output: str) -> list[Channel]:
     """
     own = {"input_motion", "input_force", "strain"}
     return [Channel(name, "" if name in own else output) for name in CHANNELS_OF[quantity]]
+
+
+def forces_of(items: Iterable[Item]) -> dict[Channel, float]:
+    """Return the wanted forces on outputs by the channel that is measured under each.
+
+    Examples
+    --------
+    >>> from bellcrank.model import Item
+    >>> forces_of([Item(quantity="payload", case="a", output="tip", at_least=0.1)])
+    {Channel(name='loaded_motion', output='tip'): 0.1}
+    """
+    return {
+        channels_of(item.quantity, item.output)[0]: item.at_least
+        for item in items
+        if item.quantity in CARRIED and item.at_least is not None
+    }
 
 
 def has_channels(quantity: str, output: str, record: StrokeRecord) -> bool:
@@ -134,11 +151,11 @@ def quantity_values(
     if "motion" not in CHANNELS_OF[quantity]:
         return record.channels[own[0]]
     motion = record.of("motion", output)
-    if quantity == "payload":
+    if quantity in CARRIED:
         # The travel decreases linearly with the load, to first order.
-        loaded = record.of("loaded_motion", output)[..., 0]
+        loaded = record.channels[own[0]][..., 0]
         lost = _ratio(motion[..., -1:, 0] - loaded, motion[..., -1:, 0])
-        return _ratio(np.full(lost.shape, 0.5 * record.payloads[output]), np.maximum(lost, 0.0))
+        return _ratio(np.full(lost.shape, 0.5 * record.forces[own[0]]), np.maximum(lost, 0.0))
     return _of_motion(quantity, motion, *(record.channels[each] for each in own))
 
 

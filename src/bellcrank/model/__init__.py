@@ -46,6 +46,7 @@ from bellcrank.model.regions import regions
 from bellcrank.model.schema import problem_from_dict
 from bellcrank.model.section import Elasticity, Section
 from bellcrank.model.specification import (
+    CARRIED,
     QUANTITIES,
     Case,
     Item,
@@ -56,6 +57,7 @@ from bellcrank.model.specification import (
 from bellcrank.model.tolerances import Tolerances
 
 __all__ = [
+    "CARRIED",
     "IN_SPACE",
     "QUANTITIES",
     "Case",

@@ -68,6 +68,11 @@ QUANTITIES: dict[str, QuantityType] = {
         "force", "output", False,
         "force against the direction of the output that halves its travel",
     ),
+    "dead_load": QuantityType(
+        "force", "output", False,
+        "force against the direction of the output that acts before the input and halves its "
+        "travel",
+    ),
     "blocked_force": QuantityType(
         "force", "output", False, "force of the output on a stop that prevents its travel"
     ),
@@ -91,6 +96,8 @@ QUANTITIES: dict[str, QuantityType] = {
     "mass": QuantityType("volume", "design", False, "volume of all struts"),
 }  # fmt: skip
 """Quantities that items may bound, by name."""
+CARRIED = ("payload", "dead_load")
+"""Those that are forces on an output, extrapolated from the motion under the wanted one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.mechanics import VERIFICATION_INCREMENT, tightened
+from bellcrank.model import CARRIED
 from bellcrank.refine.active import ActiveRows
 from bellcrank.refine.choice import ScenarioChoice
 from bellcrank.refine.differences import NO_DIFFERENCE, difference
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 RESERVE = 0.05
 """Part of their size by which bounds are tightened, so that more elements and the sheet meet them
 too."""
-RESERVES = {"mass": 2e-3, "payload": 0.2}
+RESERVES = {"mass": 2e-3, **dict.fromkeys(CARRIED, 0.2)}
 """The same for the mass, that of all models (more than `MET`), and for the payload: near the
 largest one that a part carries, its motion is lost at once."""
 LOST_PAYLOAD = 3.0
@@ -219,7 +220,7 @@ class FrameRefinement:
         Scenarios that the geometry is far from meeting have a part of their deviations.
         """
         # A path that is stable under a larger payload may not be so under the given one.
-        payloads = {each.name: each for each in self.items if each.quantity == "payload"}
+        payloads = {each.name: each for each in self.items if each.quantity in CARRIED}
         in_scenarios = [payloads.get(each.name, each) for each in items]
 
         def rows_of(scenario: Scenario | None) -> RowEvaluator:
@@ -269,7 +270,7 @@ class FrameRefinement:
         if item.quantity == "mass" and tight.at_most is not None:
             # The shape is that of the part as drawn alone; wider struts are heavier.
             return replace(tight, at_most=tight.at_most / self.choice.largest_area)
-        if item.quantity != "payload" or tight.at_least is None:
+        if item.quantity not in CARRIED or tight.at_least is None:
             return tight
         return replace(tight, at_least=self.payload * tight.at_least)
 

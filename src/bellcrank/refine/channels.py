@@ -8,6 +8,7 @@ import numpy as np
 
 from bellcrank.mechanics import Channel, StrokeRecord, quantity_values
 from bellcrank.mechanics.items import path_deviation, reduced, scales_of
+from bellcrank.model import CARRIED
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -26,10 +27,10 @@ STEP = 1e-6
 
 def bounded(item: Item, record: StrokeRecord) -> Values:
     """Return (..., q) the constraints of an item: its bounds, at each state where they hold."""
-    if item.quantity == "payload" and item.at_least and item.at_most is None:
-        # The payload is infinite where a load changes nothing; its inverse is smooth.
-        payload = quantity_values(record, item.quantity, item.output)
-        return item.at_least / payload - 1.0
+    if item.quantity in CARRIED and item.at_least and item.at_most is None:
+        # The force is infinite where a load changes nothing; its inverse is smooth.
+        force = quantity_values(record, item.quantity, item.output)
+        return item.at_least / force - 1.0
     values = quantity_values(record, item.quantity, item.output, item.path)
     if item.quantity == "path_error" and item.path is not None and item.at_most:
         # The root mean square is curved where it is small; components at points are not.

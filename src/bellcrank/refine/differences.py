@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.mechanics import Channel
+from bellcrank.mechanics.frames.case import LOADED
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -44,22 +45,22 @@ class Difference:
     overlaps
         By how much struts overlap beyond the bound on their gaps, by load case; lattice units.
     lost
-        Ratios of the motion along the direction of an output that is lost under its payload, by
-        load case and output.
+        Ratios of the motion along the direction of an output that is lost under a force on it, by
+        load case and channel of the motion under this force.
     """
 
     channels: Mapping[str, Mapping[Channel, Values]] = field(default_factory=dict)
     overlaps: Mapping[str, float] = field(default_factory=dict)
-    lost: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    lost: Mapping[str, Mapping[Channel, float]] = field(default_factory=dict)
 
     def added_to(self, case: str, channels: Mapping[Channel, Values]) -> dict[Channel, Values]:
         """Return channels (..., F, ...) of a load case as the better model has them."""
         own = self.channels.get(case, {})
         found = {each: value + own.get(each, 0.0) for each, value in channels.items()}
-        for output, ratio in self.lost.get(case, {}).items():
-            loaded = found[Channel("loaded_motion", output)]
-            motion = found[Channel("motion", output)]
-            loaded[..., 0] = motion[..., -1:, 0] - ratio * _lost_motion(channels, output)
+        for channel, ratio in self.lost.get(case, {}).items():
+            loaded = found[channel]
+            motion = found[Channel("motion", channel.output)]
+            loaded[..., 0] = motion[..., -1:, 0] - ratio * _lost_motion(channels, channel)
         return found
 
 
@@ -78,7 +79,7 @@ def difference(better: Records, here: Records, gaps: Mapping[str, float]) -> Dif
     """
     channels: dict[str, dict[Channel, Values]] = {}
     overlaps: dict[str, float] = {}
-    lost: dict[str, dict[str, float]] = {}
+    lost: dict[str, dict[Channel, float]] = {}
     for case, record in better.items():
         own = here[case].channels
         found = {
@@ -91,19 +92,19 @@ def difference(better: Records, here: Records, gaps: Mapping[str, float]) -> Dif
         # Gaps are known where they are small; the refined geometry is at the bound.
         overlaps[case] = max(0.0, gaps.get(case, 0.0) - gap)
         lost[case] = {
-            each.output: float(wanted[0] / now[0])
+            each: float(wanted[0] / now[0])
             for each in channels[case]
-            if each.name == "loaded_motion"
-            and (now := _lost_motion(own, each.output))[0] > 0.0
-            and (wanted := _lost_motion(record.channels, each.output))[0] > 0.0
+            if each.name in LOADED
+            and (now := _lost_motion(own, each))[0] > 0.0
+            and (wanted := _lost_motion(record.channels, each))[0] > 0.0
         }
     return Difference(channels, overlaps, lost)
 
 
-def _lost_motion(channels: Mapping[Channel, Values], output: str) -> Values:
-    """Return (..., 1) the motion of an output along its direction that its payload takes."""
-    motion = channels[Channel("motion", output)]
-    return np.asarray(motion[..., -1:, 0] - channels[Channel("loaded_motion", output)][..., 0])
+def _lost_motion(channels: Mapping[Channel, Values], loaded: Channel) -> Values:
+    """Return (..., 1) the motion of an output along its direction that a force on it takes."""
+    motion = channels[Channel("motion", loaded.output)]
+    return np.asarray(motion[..., -1:, 0] - channels[loaded][..., 0])
 
 
 def on_same_path(first: Records, second: Records, departure: float = LARGEST_DEPARTURE) -> bool:

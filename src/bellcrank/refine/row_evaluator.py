@@ -215,7 +215,7 @@ class RowEvaluator:
         if name not in here.channels:
             here.channels[name] = case.evaluator.values(case.channels, fractions.tolist())
         channels = here.channels[name]
-        record = StrokeRecord(fractions, channels, payloads=case.evaluator.payloads, kinks=kinks)
+        record = StrokeRecord(fractions, channels, forces=case.evaluator.forces, kinks=kinks)
         wanted = [each for each in evaluator.objectives if each.case == name]
 
         def rows_at(channels: Mapping[Channel, Values]) -> tuple[Values, Values]:
@@ -308,7 +308,7 @@ class RowEvaluator:
     def _stability_rows(self, here: _Geometry, name: str, *, slopes: bool) -> Rows | None:
         """Return the constraints on the lowest stiffness of a load case along the stroke."""
         case = here.evaluator.cases[name].evaluator
-        paths = [case.frame, *(case.other("payload", output) for output in case.payloads)]
+        paths = [case.frame, *case.loaded]
         none = np.zeros((0, self.variables.count))
         constraints, gradients, keys = [np.zeros(0)], [none], []
         for index, frame in enumerate(paths):

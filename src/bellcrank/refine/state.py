@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from bellcrank.errors import InvalidSettings
+from bellcrank.model import CARRIED
 from bellcrank.part.outline import room_for_fillet
 from bellcrank.refine.differences import on_same_path
 from bellcrank.refine.shape import shape_rows
@@ -101,7 +102,7 @@ def _is_stable(items: tuple[ItemResult, ...]) -> bool:
 
 def loses_payload(items: tuple[ItemResult, ...]) -> bool:
     """Whether a path is lost under a payload."""
-    return any(each.item.quantity == "payload" and math.isnan(each.value) for each in items)
+    return any(each.item.quantity in CARRIED and math.isnan(each.value) for each in items)
 
 
 def total_violation(items: tuple[ItemResult, ...]) -> float:

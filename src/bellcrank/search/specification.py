@@ -23,7 +23,7 @@ from bellcrank.mechanics import (
     tightened,
     violation,
 )
-from bellcrank.mechanics.items import TOLERANCE, reduced, relative_distance
+from bellcrank.mechanics.items import TOLERANCE, forces_of, reduced, relative_distance
 from bellcrank.search.clearance import gap_less_overlaps
 from bellcrank.search.constraints.evaluator import BASE_PENALTY
 from bellcrank.search.given import GivenQuantities
@@ -106,12 +106,8 @@ class SpecificationEvaluator:
         self._volume = section.area_of(problem.beam_widths) * problem.lattice.rest_length
         self.cases: dict[str, _Case] = {}
         for name, case in problem.cases.items():
-            payloads = {
-                item.output: item.at_least
-                for item in self.items
-                if item.quantity == "payload" and item.case == name and item.at_least is not None
-            }
-            evaluator = CaseEvaluator(case, elements, wanted.weight, payloads)
+            forces = forces_of(item for item in self.items if item.case == name)
+            evaluator = CaseEvaluator(case, elements, wanted.weight, forces)
             chosen = [k for k, item in enumerate(self.items) if item.case == name]
             needed = [(self.items[k].quantity, self.items[k].output) for k in chosen]
             needed += [
@@ -197,7 +193,7 @@ class SpecificationEvaluator:
                 fractions = fractions_of(items, case.evaluator.problem.input.kinks, verified=True)
             channels = case.evaluator.values(case.cheap, fractions.tolist(), at_end)
             records[name] = StrokeRecord(
-                fractions, channels, structural, case.evaluator.payloads,
+                fractions, channels, structural, case.evaluator.forces,
                 case.evaluator.problem.input.kinks,
             )  # fmt: skip
         yield records

@@ -264,7 +264,7 @@ class CaseReader:
             outputs[name] = self._output(section, where)
             for quantity in (
                 "gain", "travel", "off_axis", "rotation", "stiffness", "payload",
-                "blocked_force", "sag",
+                "dead_load", "blocked_force", "sag",
             ):  # fmt: skip
                 wanted = getattr(section, quantity)
                 reader.read(quantity, wanted, f"{where}.{quantity}", name)

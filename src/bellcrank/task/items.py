@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from bellcrank.errors import InvalidProblem, InvalidSettings
-from bellcrank.model import QUANTITIES, Item, ObjectiveTerm
+from bellcrank.model import CARRIED, QUANTITIES, Item, ObjectiveTerm
 from bellcrank.part.units import read_quantity
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ READINGS = {
     "rotation": Reading("angle", "plus_minus", True, 360.0),
     "stiffness": Reading("stiffness", "at_least", False),
     "payload": Reading("load", "at_least", False),
+    "dead_load": Reading("load", "at_least", False),
     "blocked_force": Reading("force", "at_least", False),
     "sag": Reading("ratio", "at_most", False, 2.0),
     "input_force": Reading("force", "at_most", False),
@@ -114,7 +115,7 @@ class ItemReader:
     def _single(self, quantity: str, value: Any, key: str, named: dict[str, Any]) -> None:
         """Read a single value in place of a table."""
         reading = READINGS[quantity]
-        if value in {"maximise", "minimise"} and quantity != "payload":
+        if value in {"maximise", "minimise"} and quantity not in CARRIED:
             sign = 1.0 if value == "maximise" else -1.0
             self._add_objective(named, sign, scaled=False)
             return
@@ -221,10 +222,8 @@ class ItemReader:
                     f"{key}.scale: expected a number above 0, got {bounds.scale!r}"
                 )
         sign = 1.0 if bounds.maximise else -1.0
-        if quantity == "payload" and bounds.at_least is None:
-            raise InvalidProblem(
-                f"{key}: a payload that is maximised needs at_least, to begin with"
-            )
+        if quantity in CARRIED and bounds.at_least is None:
+            raise InvalidProblem(f"{key}: a load that is maximised needs at_least, to begin with")
         self._add_objective(named, sign * scale, scaled=bounds.scale is not None)
 
     def _add_objective(self, named: dict[str, Any], scale: float, *, scaled: bool) -> None:

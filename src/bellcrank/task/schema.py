@@ -205,6 +205,7 @@ class OutputSection(Table):
     path: PathSection | None = None
     stiffness: Wanted = Field(default_factory=list)
     payload: Wanted = Field(default_factory=list)
+    dead_load: Wanted = Field(default_factory=list)
     blocked_force: Wanted = Field(default_factory=list)
     sag: Wanted = Field(default_factory=list)
 

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.fem.results import finite
+from bellcrank.model import CARRIED
 from bellcrank.part.units import GRAVITY
 from bellcrank.task import units_of
 from bellcrank.workflows.specification import item_label, number_text, shown_value, wanted_text
@@ -93,7 +94,7 @@ def _reached(item: Item, value: float, units: ProblemUnits) -> str:
 
 
 def _grams(item: Item, value: float | None, units: ProblemUnits) -> str:
-    """Return a payload as a mass in brackets; empty for other quantities."""
-    if item.quantity != "payload" or value is None or not math.isfinite(value):
+    """Return a load as a mass in brackets; empty for other quantities."""
+    if item.quantity not in CARRIED or value is None or not math.isfinite(value):
         return ""
     return f" ({1000.0 * units.in_part('force', value) / GRAVITY:.3g} g)"

@@ -77,6 +77,7 @@ class ProgressReporter:
         from bellcrank.part import PartSpec
         from bellcrank.search import symmetry_groups
         from bellcrank.web.quick_calls import specification_of
+        from bellcrank.workflows.refiners import GeometryCount
 
         self._pipe = pipe
         self._problem = folder.problem
@@ -86,7 +87,6 @@ class ProgressReporter:
         self._part = PartSpec.from_dict(folder.provenance.get("part") or {}, "part")
         self._refinement = RefinementDisplay(self._part)
         self._total = settings.chains * settings.steps
-        self._chain_count = settings.chains
         self._lock = threading.Lock()
         self._chains: dict[int, dict[str, Any]] = {}
         self._scores: dict[int, float] = {}
@@ -96,6 +96,7 @@ class ProgressReporter:
         self._moved_at, self._moved_mask = 0.0, ""
         self._tried: tuple[int, int] | None = None
         self._refined: dict[int, RefinementProgress] = {}
+        self._geometries = GeometryCount(settings.chains)
         self._done = {chain: folder.progress(chain)[0] for chain in range(settings.chains)}
         self._points.update(self._first_points(settings))
         self._end = threading.Event()
@@ -148,18 +149,8 @@ class ProgressReporter:
         """Record the progress of the refinement of a design."""
         with self._lock:
             self._refined[number] = progress
+            self._geometries.add(number, progress.evaluations)
             self._refinement.add(number, progress)
-
-    def _most_geometries(self, designs: int) -> int:
-        """Return the usual number of geometries of all refinements, of the first and further ones.
-
-        A part may need some more in its better model.
-        """
-        from bellcrank.search.choice import STARTS
-        from bellcrank.workflows.refiners import EVALUATIONS, FIRST_EVALUATIONS
-
-        first = max(designs, STARTS * self._chain_count)
-        return FIRST_EVALUATIONS * first + EVALUATIONS * self._chain_count
 
     def refined_designs(self) -> list[Design]:
         """Return the best design of each refinement that meets all items, the best first."""
@@ -181,6 +172,7 @@ class ProgressReporter:
             chains = {chain: self._whole(state) for chain, state in self._chains.items()}
             done, made, tried = sum(self._done.values()), self._made, self._tried
             refined, scores = dict(self._refined), dict(self._scores)
+            done_refined, most_refined = self._geometries.done, self._geometries.most
             shape = self._refinement.design
         speed = made / max(time.monotonic() - self._start, 1e-9)
         message: dict[str, Any] = {
@@ -192,7 +184,7 @@ class ProgressReporter:
             "total": self._total,
             "left": round((self._total - done) / max(speed, 1e-9), 1),
             "tried": tried,
-            "refined": _refinement_of(refined.values(), self._most_geometries(len(refined))),
+            "refined": _refinement_of(refined.values(), done_refined, most_refined),
         }
         best = chains[max(scores, key=scores.__getitem__)]
         if shape is not None:
@@ -295,7 +287,9 @@ def displayed(
     }
 
 
-def _refinement_of(latest: Collection[RefinementProgress], most: int) -> dict[str, Any] | None:
+def _refinement_of(
+    latest: Collection[RefinementProgress], done: int, most: int
+) -> dict[str, Any] | None:
     """Return how far refinements are: designs, geometries, sheets, the best objective.
 
     The objective is that of designs that meet all items.
@@ -307,7 +301,7 @@ def _refinement_of(latest: Collection[RefinementProgress], most: int) -> dict[st
     met = [each.rows.objective for each in latest if each.rows.violation <= MET]
     return {
         "designs": len(latest),
-        "geometries": sum(each.evaluations for each in latest),
+        "geometries": done,
         "sheets": sum(each.sheets for each in latest),
         "most": most,
         "objective": float(max(met)) if met else None,
@@ -412,7 +406,7 @@ def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[st
         message = {
             "kind": "progress", "points": {}, "chains": {}, "speed": None, "left": None,
             "done": progress.evaluations, "total": total, "tried": None,
-            "refined": _refinement_of([progress], total),
+            "refined": _refinement_of([progress], progress.evaluations, total),
         }  # fmt: skip
         if display.design is not None:
             message |= display.message(display.design)

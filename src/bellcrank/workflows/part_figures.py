@@ -16,7 +16,7 @@ from bellcrank.mechanics import (
     StrokeRecord,
 )
 from bellcrank.mechanics.frames.analysis import strain_amplitude
-from bellcrank.mechanics.frames.case import with_output, with_payload
+from bellcrank.mechanics.frames.case import with_output
 from bellcrank.task import units_of
 
 if TYPE_CHECKING:
@@ -34,10 +34,10 @@ SHEET_QUANTITIES = ("gain", "off_axis", "rotation", "input_force", "strain", "st
 """Quantities of the figures in the sheet."""
 STATES = 16
 """Number of states along the stroke."""
-PAYLOAD_TRIALS = 12
-"""Largest number of responses in the search for the payload that halves the motion."""
-PAYLOAD_TOLERANCE = 0.01
-"""Relative accuracy of this payload."""
+LOAD_TRIALS = 12
+"""Largest number of responses in the search for a load that halves the motion."""
+LOAD_TOLERANCE = 0.01
+"""Relative accuracy of this load."""
 
 
 def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> list[dict[str, Any]]:
@@ -84,14 +84,14 @@ def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> li
             if response.status is Status.CONVERGED:
                 row |= _motion(evaluator, output, units)
                 stiffness = row["output_stiffness_N_per_mm"] or 0.0
-                payload = _payload(
-                    with_output(case, output),
-                    design.mask,
-                    elements,
-                    row["travel_mm"] / units.length,
-                    units.in_problem("stiffness", stiffness),
-                )
-                row["payload_N"] = None if payload is None else units.in_part("force", payload)
+                wanted = with_output(case, output)
+                travel = row["travel_mm"] / units.length
+                first = 0.5 * travel * units.in_problem("stiffness", stiffness)
+                payload = _halving_load(wanted, design.mask, elements, travel, first, dead=False)
+                first = first if payload is None else payload
+                dead = _halving_load(wanted, design.mask, elements, travel, first, dead=True)
+                for key, load in (("payload_N", payload), ("dead_load_N", dead)):
+                    row[key] = None if load is None else units.in_part("force", load)
             rows.append(row)
     return rows
 
@@ -201,32 +201,39 @@ def limit_points(fractions: Values, force: Values) -> list[float]:
     return [float(fractions[index]) for index in np.flatnonzero(turns)]
 
 
-def _payload(
+def _halving_load(
     problem: Problem,
     mask: NDArray[np.bool_],
     elements: int | None,
     travel: float,
-    stiffness: float,
+    first: float,
+    *,
+    dead: bool,
 ) -> float | None:
     """Return the force against the direction of the output that halves its travel.
 
-    None if the motion is lost before. Found by bisection between loads, from the linear estimate.
+    None if the motion is lost before. Found by bisection, from a first estimate.
+
+    Parameters
+    ----------
+    dead
+        Whether the force acts before the input, and not in proportion to it.
     """
-    if travel <= 0.0 or stiffness <= 0.0:
+    if travel <= 0.0 or first <= 0.0:
         return None
+    loaded = Channel("carried_motion" if dead else "loaded_motion", next(iter(problem.outputs)))
 
     def travel_under(force: float) -> float:
-        evaluator = CaseEvaluator(with_payload(problem, force), elements)
-        response = evaluator.respond(mask, VERIFICATION_INCREMENT)
+        (evaluator,) = CaseEvaluator(problem, elements, forces={loaded: force}).loaded
+        response = evaluator.evaluate(mask, VERIFICATION_INCREMENT)
         if response.status is not Status.CONVERGED:
             return -math.inf
-        name = next(iter(problem.outputs))
-        channel = Channel("motion", name)
-        return float(evaluator.values([channel], [1.0])[channel][0, 0])
+        moved = response.displacement[problem.output.nodes]
+        return float((moved * problem.output.direction).sum(axis=1).mean())
 
-    low, high = 0.0, 0.5 * travel * stiffness
-    for _ in range(PAYLOAD_TRIALS):
-        if high - low <= PAYLOAD_TOLERANCE * high and low > 0.0:
+    low, high = 0.0, first
+    for _ in range(LOAD_TRIALS):
+        if high - low <= LOAD_TOLERANCE * high and low > 0.0:
             break
         middle = high if low == 0.0 else 0.5 * (low + high)
         if travel_under(middle) >= 0.5 * travel:

@@ -17,6 +17,7 @@ from bellcrank.processes import FunctionProcesses
 from bellcrank.refine import Refinement, RefinementSettings, refine_design
 from bellcrank.refine.differences import on_same_path
 from bellcrank.search import SpecificationEvaluator
+from bellcrank.search.choice import STARTS
 from bellcrank.search.verification import ELEMENTS
 
 if TYPE_CHECKING:
@@ -43,6 +44,47 @@ DISPLACED = 0.1
 lose it where they are soft, which no symmetric model shows."""
 DEPARTURE = 0.2
 """Largest difference of the motions of two such parts, over the motion."""
+
+
+class GeometryCount:
+    """Number of geometries of the refinements of several designs of a search.
+
+    Parameters
+    ----------
+    chains
+        Number of chains of the search.
+
+    Examples
+    --------
+    >>> count = GeometryCount(chains=1)
+    >>> for evaluations in (60, 100, 20):  # the third is that of a second refinement
+    ...     count.add(0, evaluations)
+    >>> count.done, count.most
+    (120, 800)
+    """
+
+    def __init__(self, chains: int) -> None:
+        self._chains = chains
+        self._latest: dict[int, int] = {}
+        self._before = 0
+
+    def add(self, number: int, evaluations: int) -> None:
+        """Record the number of geometries of the refinement of a design."""
+        last = self._latest.get(number, 0)
+        if evaluations < last:
+            self._before += last
+        self._latest[number] = evaluations
+
+    @property
+    def done(self) -> int:
+        """Number of geometries so far."""
+        return self._before + sum(self._latest.values())
+
+    @property
+    def most(self) -> int:
+        """Usual largest number; a part may need some more in its better model."""
+        first = max(len(self._latest), STARTS * self._chains)
+        return FIRST_EVALUATIONS * first + EVALUATIONS * self._chains
 
 
 def refine_designs(

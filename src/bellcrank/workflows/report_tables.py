@@ -40,7 +40,9 @@ def figure_table(report: DesignReport, number: str = "{:.4f}") -> list[list[str]
         ("rotation of the output", "output_rotation_deg", "{:.1f} deg"),
     ):
         rows.append([name, *(figure_text(each[key], form) for each in report.figures)])
-    rows.append(["input force", *(_force(report, each["input_force"]) for each in report.figures)])
+    if not report.part_figures:  # they have the force along the input
+        forces = (_force(report, each["input_force"]) for each in report.figures)
+        rows.append(["input force", *forces])
     return [*rows, *_part_rows(report)]
 
 
@@ -74,6 +76,7 @@ FIGURES = (
     ("input force, largest along the stroke", ("largest_input_force_N",), "{:.3g}", "N"),
     ("output stiffness", ("output_stiffness_N_per_mm",), "{:.3g}", "N/mm"),
     ("payload that halves the travel", ("payload_N",), "{:.3g}", "N"),
+    ("dead load that halves the travel", ("dead_load_N",), "{:.3g}", "N"),
     ("blocked force at full stroke", ("blocked_force_N",), "{:.3g}", "N"),
     ("sag under own weight, upright", ("sag_mm",), "{:.3g}", "mm"),
 )

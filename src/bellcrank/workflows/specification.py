@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.fem.results import finite
 from bellcrank.mechanics import VERIFICATION_INCREMENT
-from bellcrank.model import QUANTITIES
+from bellcrank.model import CARRIED, QUANTITIES
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.task import NAMES, units_of
 
@@ -30,7 +30,7 @@ ROUNDING = 1e-9
 LABELS = {
     "off_axis": "off-axis motion", "path_error": "path error", "blocked_force": "blocked force",
     "input_force": "input force", "stable_stroke": "stable stroke",
-    "strut_loss": "strut loss",
+    "strut_loss": "strut loss", "dead_load": "dead load",
 }  # fmt: skip
 """Names of quantities whose words differ from their keys."""
 
@@ -168,12 +168,12 @@ def item_rows(
 
 
 def shown_value(item: Item, value: float) -> float:
-    """Return the value of an item; infinite for more than a wanted payload.
+    """Return the value of an item; infinite for more than a wanted payload or dead load.
 
     That is extrapolated from the motion under the wanted one, and larger ones may be carried less
     well.
     """
-    least = item.at_least if item.quantity == "payload" else None
+    least = item.at_least if item.quantity in CARRIED else None
     return value if least is None or not value > least else math.inf
 
 

@@ -21,7 +21,8 @@ from bellcrank.fem.continuum.backend import ngsolve, threads
 from bellcrank.fem.continuum.stability import count_negative, extreme_compliances
 from bellcrank.fem.continuum.system import MEAN_ORDER, integration
 from bellcrank.fem.path import Linearisation
-from bellcrank.model.stroke_ranges import kinks_of, rate_at, share_at
+from bellcrank.mechanics.frames.system import DEAD
+from bellcrank.model.stroke_ranges import WHOLE, kinks_of, rate_at, share_at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -108,8 +109,8 @@ class ContinuumEquations:
 
     @cached_property
     def kinks(self) -> tuple[float, ...]:
-        """Fractions within the stroke at which a prescribed displacement starts or stops."""
-        return kinks_of(self._ranges)
+        """Fractions of the stroke at which a force or prescribed displacement starts or stops."""
+        return kinks_of(np.concatenate([self._ranges, self._periods]))
 
     @cached_property
     def _ranges(self) -> NDArray[np.float64]:
@@ -117,26 +118,40 @@ class ContinuumEquations:
         means = self.system.boundary.means
         return np.array([constraint.during for constraint in means]).reshape(-1, 2)
 
-    def _load_at(self, load: float) -> NDArray[np.float64]:
-        """Return (F,) the part of the residual that depends on the load."""
-        count = len(self._ranges)
-        total = load * self.load
-        total[len(total) - count :] = self.load[len(total) - count :] * share_at(self._ranges, load)
-        return total
+    @cached_property
+    def _periods(self) -> NDArray[np.float64]:
+        """(1, 2) or (2, 2) the same of the forces, and of those that act before the input."""
+        if self.system.boundary.dead_force is None:
+            return np.array([WHOLE])
+        return np.array([[DEAD, 1.0], [0.0, DEAD]])
 
     @cached_property
-    def load(self) -> NDArray[np.float64]:
-        """(F,) change of the residual by the full load, for all degrees of freedom."""
-        system = self.system
-        boundary = system.boundary
+    def _motions(self) -> NDArray[np.float64]:
+        """(g,) change of the residual by the full prescribed displacements."""
+        motion = np.array([constraint.motion for constraint in self.system.boundary.means])
+        return -self.system.unit * motion
+
+    @cached_property
+    def _forces(self) -> NDArray[np.float64]:
+        """(1, F) or (2, F) change of the residual by the full forces, as `_periods`."""
+        boundary = self.system.boundary
         form = self._hub_load(boundary.loaded, boundary.force)
         if boundary.weight is not None:
             form += self._body_force(self.space.TestFunction()[0], boundary.weight)
-        form.Assemble()
-        load: NDArray[np.float64] = -form.vec.FV().NumPy()
-        motion = np.array([constraint.motion for constraint in boundary.means])
-        load[len(load) - len(motion) :] -= system.unit * motion
-        return load
+        forms = [form]
+        if boundary.dead_force is not None:
+            forms.append(self._hub_load(boundary.loaded, boundary.dead_force))
+        rows = []
+        for each in forms:
+            each.Assemble()
+            rows.append(-each.vec.FV().NumPy())
+        return np.array(rows)
+
+    def _load_at(self, load: float) -> NDArray[np.float64]:
+        """Return (F,) the part of the residual that depends on the load."""
+        total: NDArray[np.float64] = share_at(self._periods, load) @ self._forces
+        total[len(total) - len(self._motions) :] += self._motions * share_at(self._ranges, load)
+        return total
 
     def _hub_load(self, nodes: NDArray[np.int64], force: NDArray[np.float64]) -> Any:
         """Return the form of the work of forces (n, d) on hubs, N."""
@@ -195,8 +210,9 @@ class ContinuumEquations:
 
         It is constant between kinks.
         """
-        count, rate = len(self._ranges), self.load.copy()
-        rate[len(rate) - count :] *= rate_at(self._ranges, load, toward)
+        rate: NDArray[np.float64] = rate_at(self._periods, load, toward) @ self._forces
+        given = self._motions * rate_at(self._ranges, load, toward)
+        rate[len(rate) - len(given) :] += given
         return rate[self.free]
 
     def distance(self, change: NDArray[np.float64]) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 
 from bellcrank.fem.continuum.backend import ngsolve
 from bellcrank.fem.continuum.laws import lame_of, laws
+from bellcrank.mechanics.frames.system import DEAD
 from bellcrank.model.stroke_ranges import WHOLE
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from bellcrank.fem.continuum.laws import Lame, Law
     from bellcrank.fem.continuum.mesh import ContinuumMesh
+    from bellcrank.model import NodeForce
     from bellcrank.part.part import Part
 
 ORDER = {2: 4, 3: 2}
@@ -74,6 +76,9 @@ class Boundary:
         Forces on them at the full load, N.
     weight : (d,) float64, optional
         Own weight at the full load, N / mm^3.
+    dead_force : (p, d) float64, optional
+        Forces on the loaded hubs that act before the input, in the first part of the load (`DEAD`);
+        None for an input that begins with the load.
     """
 
     clamped: NDArray[np.int64]
@@ -81,9 +86,12 @@ class Boundary:
     loaded: NDArray[np.int64]
     force: NDArray[np.float64]
     weight: NDArray[np.float64] | None = None
+    dead_force: NDArray[np.float64] | None = None
 
 
-def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary:
+def boundary_of(
+    part: Part, hubs: NDArray[np.int64], dimension: int, dead_load: NodeForce | None = None
+) -> Boundary:
     """Return the supports and loads of the hubs of a part.
 
     In the mesh of a solid, the mean displacement of driven hubs of a part in the plane, and of
@@ -97,8 +105,11 @@ def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary
         Lattice nodes that have a hub.
     dimension
         2 for a mesh in the plane, 3 for one in space.
+    dead_load
+        Forces that act before the input, lattice units.
     """
     problem = part.design.problem
+    start = DEAD if dead_load is not None else 0.0
     supports, given = problem.supports, problem.input
     axes = [tuple(row) for row in np.eye(dimension).tolist()]
     across = axes[problem.lattice.dimension :]
@@ -111,7 +122,7 @@ def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary
     total = np.zeros(problem.lattice.positions.shape)
     if given.drive == "displacement":
         full = given.amount * part.scale * given.direction[present]
-        ranges = given.ranges[present].tolist()
+        ranges = (start + (1.0 - start) * given.ranges[present]).tolist()
         for node, motion, during in zip(
             given.nodes[present].tolist(), full.tolist(), ranges, strict=True
         ):
@@ -124,7 +135,10 @@ def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary
         total[given.nodes] += given.amount * given.direction
     for each in problem.loads.forces:
         total[each.nodes] += each.force
-    loaded = np.intersect1d(np.flatnonzero(total.any(axis=1)), hubs)
+    dead = np.zeros_like(total)
+    if dead_load is not None:
+        dead[dead_load.nodes] = dead_load.force
+    loaded = np.intersect1d(np.flatnonzero(total.any(axis=1) | dead.any(axis=1)), hubs)
     unit = part.stiffness_unit * part.scale
     weight = problem.loads.weight
     return Boundary(
@@ -133,6 +147,7 @@ def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary
         loaded,
         unit * total[loaded],
         None if weight is None else unit / part.scale**3 * weight,
+        None if dead_load is None else unit * dead[loaded],
     )
 
 
@@ -193,7 +208,11 @@ class ContinuumSystem:
 
 
 def continuum_system(
-    part: Part, mesh: ContinuumMesh, law: str = "neo-hookean", order: int | None = None
+    part: Part,
+    mesh: ContinuumMesh,
+    law: str = "neo-hookean",
+    order: int | None = None,
+    dead_load: NodeForce | None = None,
 ) -> ContinuumSystem:
     """Return a mesh with the material, supports and loads of its part.
 
@@ -207,6 +226,8 @@ def continuum_system(
         Name in the registry of laws.
     order
         Degree of exact integration of energies; by default 4 in the plane and 2 in space.
+    dead_load
+        Forces that act before the input, lattice units.
 
     Raises
     ------
@@ -216,7 +237,7 @@ def continuum_system(
     dimension = mesh.dimension
     return ContinuumSystem(
         mesh=mesh,
-        boundary=boundary_of(part, mesh.hubs, dimension),
+        boundary=boundary_of(part, mesh.hubs, dimension, dead_load),
         law=laws[law],
         lame=lame_of(part.material),
         unit=part.material.young * part.section.thickness,

@@ -51,11 +51,14 @@ CHANNELS: dict[str, Quantity] = {
     "stiffness": quantities["output_stiffness"],
     "blocked_force": quantities["blocked_force"],
     "loaded_motion": Quantity(*linear(output_fields), combine=vector, load="payload"),
+    "carried_motion": Quantity(*linear(output_fields), combine=vector, load="dead load"),
     "sag": quantities["sag"],
 }
 """Channels by name. Motion: along the wanted direction, then the components normal to it."""
 
-END_ONLY = frozenset({"stiffness", "blocked_force", "loaded_motion", "sag"})
+LOADED = ("loaded_motion", "carried_motion")
+"""Channels under a force on the output."""
+END_ONLY = frozenset({"stiffness", "blocked_force", *LOADED, "sag"})
 """Channels with a single value: at full stroke, or at rest."""
 
 
@@ -97,9 +100,21 @@ def with_payload(problem: Problem, force: float) -> Problem:
     >>> with_payload(crane, 0.1).loads.forces[0].force.sum(axis=0).round(3)
     array([0.1, 0. ])
     """
-    output, given = problem.output, problem.loads
-    own = NodeForce(output.nodes, -force / len(output.nodes) * output.direction)
-    return replace(problem, loads=Loads((*given.forces, own), given.springs, given.weight))
+    given = problem.loads
+    forces = (*given.forces, resisting_force(problem, force))
+    return replace(problem, loads=Loads(forces, given.springs, given.weight))
+
+
+def resisting_force(problem: Problem, force: float) -> NodeForce:
+    """Return a force on the output of a problem against the wanted direction.
+
+    Parameters
+    ----------
+    force
+        Total force, shared equally by the output nodes.
+    """
+    output = problem.output
+    return NodeForce(output.nodes, -force / len(output.nodes) * output.direction)
 
 
 def bound_to(quantity: Quantity, problem: Problem) -> Quantity:
@@ -134,8 +149,8 @@ class CaseEvaluator:
         As in `FrameEvaluator`.
     weight : (d,), optional
         Own weight that causes the sag: force on a unit of volume.
-    payloads : dict of str to float, optional
-        Force on each output under which its loaded motion is measured.
+    forces : dict of Channel to float, optional
+        Forces on outputs under which their loaded and carried motions are measured.
 
     Examples
     --------
@@ -155,12 +170,12 @@ class CaseEvaluator:
         problem: Problem,
         elements: int | None = None,
         weight: ArrayLike | None = None,
-        payloads: Mapping[str, float] | None = None,
+        forces: Mapping[Channel, float] | None = None,
     ) -> None:
         self.problem = problem
         self.frame = FrameEvaluator(problem, "displacement", elements)
         self._weight = weight
-        self.payloads = dict(payloads or {})
+        self.forces = dict(forces or {})
         self._by_output = {name: with_output(problem, name) for name in problem.outputs}
         self._others: dict[tuple[Load, str], FrameEvaluator] = {}
         self._quantities: dict[Channel, Quantity] = {}
@@ -251,6 +266,11 @@ class CaseEvaluator:
             self._states[fraction] = found
         return self._states[fraction]
 
+    @property
+    def loaded(self) -> list[FrameEvaluator]:
+        """Evaluators of outputs under their forces."""
+        return [self.other(CHANNELS[name].load, output) for name, output in self.forces]
+
     def other(self, load: Load, output: str) -> FrameEvaluator:
         """Return the evaluator of another load than the input."""
         if (load, output) not in self._others:
@@ -258,8 +278,13 @@ class CaseEvaluator:
             if load == "weight":
                 made = FrameEvaluator(self.problem, "displacement", elements, weight=self._weight)
             elif load == "payload":
-                loaded = with_payload(self._by_output[output], self.payloads[output])
+                force = self.forces[Channel("loaded_motion", output)]
+                loaded = with_payload(self._by_output[output], force)
                 made = FrameEvaluator(loaded, "displacement", elements)
+            elif load == "dead load":
+                carried = self._by_output[output]
+                dead = resisting_force(carried, self.forces[Channel("carried_motion", output)])
+                made = FrameEvaluator(carried, "displacement", elements, dead_load=dead)
             else:
                 held = with_held_output(self._by_output[output])
                 made = FrameEvaluator(held, "displacement", elements)
@@ -316,7 +341,7 @@ class CaseEvaluator:
     def _shape(self, channel: Channel) -> tuple[int, ...]:
         """Return the shape of the values of a channel at one state."""
         dimension = self.problem.lattice.dimension
-        if channel.name in {"motion", "loaded_motion"}:
+        if channel.name in {"motion", *LOADED}:
             return (1 + dimension,)
         return (dimension,) if channel.name == "displacement" else ()
 

@@ -31,7 +31,10 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics.kernels.arrays import Floats
     from bellcrank.mechanics.objectives import Objective
-    from bellcrank.model import Problem
+    from bellcrank.model import NodeForce, Problem
+
+DEAD = 0.25
+"""Part of the load in which dead loads grow, before the input."""
 
 
 def allocate_state(nodes: int, size: int) -> State:
@@ -191,6 +194,7 @@ def build_frame(
     theory: str = "euler-bernoulli",
     mask: NDArray[np.bool_] | None = None,
     weight: Floats | None = None,
+    dead_load: NodeForce | None = None,
 ) -> Frame:
     """Convert a problem with a section to the arrays of a frame.
 
@@ -205,6 +209,9 @@ def build_frame(
         Beams of the lattice that the frame has; all by default.
     weight : (d,), optional
         Force on a unit of volume; by default that of the problem.
+    dead_load
+        Forces that act before the stroke and during it. They grow in the first part of the load
+        (`DEAD`), the input and the loads of the problem in the rest.
 
     Raises
     ------
@@ -230,6 +237,11 @@ def build_frame(
     held = held_unknowns(problem, nodes, size)
     any_held, all_held = np.asarray(held.any(axis=1)), np.asarray(held.all(axis=1))
     drive, load = drive_and_load(problem, nodes, size)
+    hung, start = np.zeros((nodes, size)), 0.0
+    if dead_load is not None:
+        hung[dead_load.nodes, :dimension] = dead_load.force
+        start = DEAD
+    kinks = [start + (1.0 - start) * kink for kink in problem.input.kinks]
     protected = any_held.astype(np.uint8)
     protected[problem.special_nodes] = 1
     grounded, prescribed = np.zeros(nodes, np.uint8), np.zeros(nodes, np.uint8)
@@ -270,10 +282,12 @@ def build_frame(
         partly=(any_held & ~all_held).astype(np.uint8),
         block=elimination_order(beams, all_held, springs=False),
         drive=drive,
-        ramp=drive_ramps(problem, nodes),
-        has_ramps=problem.input.during is not None,
-        kinks=np.array(problem.input.kinks, dtype=np.float64),
+        ramp=start + (1.0 - start) * drive_ramps(problem, nodes),
+        has_ramps=problem.input.during is not None or start > 0.0,
+        kinks=np.array([start, *kinks] if start else kinks, dtype=np.float64),
         load=load,
+        dead_load=hung,
+        start=start,
         weight=of_beam,
         has_weight=weight is not None,
         ground=ground,

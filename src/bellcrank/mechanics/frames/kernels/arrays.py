@@ -73,6 +73,10 @@ class Frame(Bundle):
     """Fractions within the load at which a node of the drive starts or stops, ascending."""
     load: Floats
     """(N, b) force and moment at full load."""
+    dead_load: Floats
+    """(N, b) force and moment that act before the drive and the other loads."""
+    start: float
+    """Fraction of the load at which these begin; 0 without dead loads."""
     weight: Floats
     """(M, 3) force on each beam at full load, one half on either end."""
     has_weight: bool

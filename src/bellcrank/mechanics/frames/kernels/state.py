@@ -130,6 +130,20 @@ def difference(start: State, end: State, out: Floats) -> None:
 
 
 @kernel
+def load_share(frame: Frame, fraction: float) -> float:
+    """Return the part of forces and own weight that acts at a load."""
+    if frame.start == 0.0:
+        return fraction
+    return max(0.0, (fraction - frame.start) / (1.0 - frame.start))
+
+
+@kernel
+def dead_share(frame: Frame, fraction: float) -> float:
+    """Return the part of the dead load that acts at a load."""
+    return min(1.0, fraction / frame.start) if frame.start > 0.0 else 0.0
+
+
+@kernel
 def drive_share(frame: Frame, node: int, fraction: float) -> float:
     """Return the part of its full motion that a node of the drive has at a load."""
     if not frame.has_ramps:

@@ -191,7 +191,7 @@ def classify_piece(
         if frame.grounded[node]:
             return CONVERGED
         for axis in range(size):
-            follows &= frame.load[node, axis] == 0.0
+            follows &= frame.load[node, axis] == 0.0 and frame.dead_load[node, axis] == 0.0
             if frame.held[node, axis] and not frame.prescribed[node]:
                 follows = False
         for axis in range(3):

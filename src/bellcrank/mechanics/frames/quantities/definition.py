@@ -19,9 +19,10 @@ if TYPE_CHECKING:
 
     Values = NDArray[np.float64]
 
-Load = Literal["input", "held output", "payload", "weight"]
+Load = Literal["input", "held output", "payload", "dead load", "weight"]
 """Load of an equilibrium: the input; the input with the output held along the wanted direction; the
-input with a force on the output against that direction; the own weight alone, at rest."""
+input with a force on the output against that direction, which grows with the input or acts before
+it; the own weight alone, at rest."""
 
 
 class Measures(NamedTuple):
