@@ -7,10 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from bellcrank.fem.specification import sheet_items, sheet_records
-from bellcrank.mechanics import VERIFICATION_INCREMENT
+from bellcrank.fem.specification import sheet_records
+from bellcrank.mechanics import VERIFICATION_INCREMENT, item_results
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.task import task_from_dict
+from bellcrank.workflows.part_figures import SHEET_QUANTITIES, part_figures, sheet_figures
 
 pytest.importorskip("ngsolve")
 
@@ -33,7 +34,8 @@ TASK = {
             "outputs": [
                 {"name": "tip", "at": {"edge": "top", "between": [0, 16]}, "direction": "right",
                  "gain": {"at_least": 0.1}, "off_axis": 2, "rotation": "40 deg", "sag": 2,
-                 "payload": "1 g", "dead_load": "1 g", "stiffness": "0.001 N/mm", "blocked_force": "1 mN",
+                 "payload": "1 g", "dead_load": "1 g", "stiffness": "0.001 N/mm",
+                 "blocked_force": "1 mN",
                  "path": {"points": [[0, 0], [2, 0]], "error": "50%"}},
                 {"name": "side", "at": {"point": [41, 27]}, "direction": "right",
                  "travel": "0.01 mm", "rotation": "40 deg"},
@@ -85,8 +87,11 @@ def test_all_quantities_in_the_sheet_are_near_those_of_frames() -> None:
     assert evaluator.evaluate(mask, VERIFICATION_INCREMENT).is_admissible
     frames = evaluator.results()
     design = problem.full_design().with_mask(mask)
-    sheet = sheet_items(task.part.of(design), size=1.0)
-    assert sheet is not None
+    part = task.part.of(design)
+    records = sheet_records(part, size=1.0, quantities=SHEET_QUANTITIES)
+    assert records is not None
+    assert problem.specification is not None
+    sheet = item_results(problem.specification.items, records)
     assert [each.item.name for each in sheet] == [each.item.name for each in frames]
     for one, other in zip(frames, sheet, strict=True):
         if math.isinf(one.value):
@@ -94,3 +99,12 @@ def test_all_quantities_in_the_sheet_are_near_those_of_frames() -> None:
             continue
         limit = DEVIATION.get(one.item.quantity, USUAL)
         assert other.value == pytest.approx(one.value, rel=limit, abs=1e-3), one.item.name
+    figures, expected = sheet_figures(problem, task.part, records), part_figures(design, task.part)
+    assert [each["output"] for each in figures] == ["tip", "side", "output"]
+    for found, frame in zip(figures, expected, strict=True):
+        for key in ("efficiency", "travel_mm", "largest_input_force_N", "strain"):
+            limit = DEVIATION["strain"] if key == "strain" else USUAL
+            assert found[key] == pytest.approx(frame[key], rel=limit, abs=1e-3), key
+    # The sag is that of the output whose specification bounds it.
+    assert [each["sag_mm"] is not None for each in figures] == [True, False, False]
+
