@@ -105,7 +105,8 @@ def test_the_part_of_the_readme_is_that_of_its_record() -> None:
     assert f"4 mm down, output {figures['travel_mm']:.1f} mm up" in text
     assert f"{figures['efficiency_half']:.2f} at half of the stroke" in text
     assert f"sags by {figures['sag_mm']:.1f} mm" in text
-    assert f"a load of {1000.0 * figures['payload_N'] / GRAVITY:.0f} g halves" in text
+    weight = 1000.0 * figures["dead_load_N"] / GRAVITY
+    assert f"a weight of {weight:.0f} g that hangs on it before the push halves" in text
     sheet = json.loads((README.parent / "docs" / "start" / "validation.json").read_text())
     (plane,) = [each for each in sheet["results"] if each["level"] == "plane"]
     assert f"it moves {plane['mean_output_displacement_mm'][1]:.1f} mm up" in text

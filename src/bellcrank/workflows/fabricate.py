@@ -113,7 +113,12 @@ class Grips:
         depth = max(self.screw_diameter + 2.0 * self.wall, part.section.width)
         for name, nodes in blocks.items():
             shown, drawn, blocks[name] = with_outer_rows(
-                shown, drawn, nodes, depth + part.section.width, ROW * part.scale
+                shown,
+                drawn,
+                nodes,
+                depth + part.section.width,
+                ROW * part.scale,
+                margin=float(width.max()),
             )
             more = np.full(len(drawn) - len(width), part.section.width)
             width = np.append(width, more)

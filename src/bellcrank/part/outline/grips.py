@@ -102,7 +102,12 @@ def filled(
 
 
 def with_outer_rows(
-    positions: ArrayLike, beams: ArrayLike, nodes: ArrayLike, depth: float, reach: float
+    positions: ArrayLike,
+    beams: ArrayLike,
+    nodes: ArrayLike,
+    depth: float,
+    reach: float,
+    margin: float = 0.0,
 ) -> tuple[Reals, Ids, Ids]:
     """Return nodes and beams with a row of nodes outside of each row of given nodes.
 
@@ -122,6 +127,8 @@ def with_outer_rows(
         Distance of the new rows.
     reach : float, mm
         Largest distance of neighbours in a row.
+    margin : float, mm
+        Distance to be left between the new row and other nodes.
 
     Returns
     -------
@@ -152,10 +159,10 @@ def with_outer_rows(
     apart = np.linalg.norm(places[block][:, None] - places[block], axis=2)
     count, row_of = connected_components(apart <= reach, directed=False)
     known = {tuple(sorted(pair)) for pair in pairs.tolist()}
-    used, whole = np.unique(pairs), places
+    whole = places
     added: list[list[int]] = []
     for row in range(count):
-        line = _outer_line(places, used, block[row_of == row], depth)
+        line = _outer_line(places, pairs, block[row_of == row], depth, margin)
         if line is None:
             continue
         own, outward = line
@@ -170,10 +177,12 @@ def with_outer_rows(
     return whole, np.vstack([pairs, np.array(added, dtype=np.int64).reshape(-1, 2)]), block
 
 
-def _outer_line(places: Reals, used: Ids, nodes: Ids, depth: float) -> tuple[Ids, Reals] | None:
-    """Return nodes in their order on a line, and the side on which there are no other nodes.
+def _outer_line(
+    places: Reals, pairs: Ids, nodes: Ids, depth: float, margin: float
+) -> tuple[Ids, Reals] | None:
+    """Return nodes in their order on a line, and the side on which there is room for a row.
 
-    None if they are not on a line, or there are nodes on both sides within twice the depth.
+    None if they are not on a line, or there are other nodes on both sides, or struts to them.
     """
     if len(nodes) < 2:
         return None
@@ -183,13 +192,18 @@ def _outer_line(places: Reals, used: Ids, nodes: Ids, depth: float) -> tuple[Ids
         return None
     along, across = axes
     order = nodes[np.argsort(places[nodes] @ along)]
-    others = places[np.setdiff1d(used, nodes)] - centre
-    low, high = np.ptp(places[nodes] @ along) * np.array([-0.5, 0.5])
-    within = (others @ along > low - depth) & (others @ along < high + depth)
-    for outward in (across, -across):
-        height = others[within] @ outward
-        if not ((height > 0.0) & (height < 2.0 * depth)).any():
-            return order, outward
+    used, joined = np.unique(pairs), np.unique(pairs[np.isin(pairs, nodes).any(axis=1)])
+    away = places[used].mean(axis=0) - centre
+    outward = -across if away @ across > 0.0 else across
+    low, high = np.ptp(places[nodes] @ along) * np.array([-0.5, 0.5]) + margin * np.array([-1, 1])
+    for side in (outward, -outward):
+        others = places - centre
+        above = others @ side > _ROW_WIDTH * sizes[0]
+        beside = (others @ along > low) & (others @ along < high)
+        near = np.isin(np.arange(len(places)), used) & (others @ side < depth + margin)
+        near[joined] = True
+        if not (above & beside & near).any():
+            return order, side
     return None
 
 
