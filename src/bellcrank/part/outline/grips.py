@@ -199,10 +199,10 @@ def _outer_line(
     for side in (outward, -outward):
         others = places - centre
         above = others @ side > _ROW_WIDTH * sizes[0]
-        beside = (others @ along > low) & (others @ along < high)
+        within = (others @ along > low) & (others @ along < high)
         near = np.isin(np.arange(len(places)), used) & (others @ side < depth + margin)
         near[joined] = True
-        if not (above & beside & near).any():
+        if not (above & within & near).any():
             return order, side
     return None
 
