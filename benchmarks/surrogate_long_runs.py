@@ -5,10 +5,9 @@
 
 The runs are in none of the trainings: their seeds are their own. Half of the runs of each set
 search for the most negative efficiency. Consecutive proposals of a run are similar, so that each
-set is a sample of its runs (`every`). Further sets are datasets that are given with
-``--set NAME=FILE``, such as those of ``python -m benchmarks.independent_simulation --dataset
-FILE``. The accuracies are written to ``docs/surrogate/long-runs.json``; a row of the same network
-and set is replaced.
+set is a sample of its runs (`every`). ``--set NAME=FILE`` tests on a dataset in place of these
+runs, such as that of ``python -m benchmarks.independent_simulation --dataset FILE``. The accuracies
+are written to ``docs/surrogate/long-runs.json``; a row of the same network and set is replaced.
 
 The bias is the mean of predicted - actual efficiency over the designs whose actual efficiency is
 beyond `BOUND` on one side.
@@ -41,10 +40,11 @@ BUNDLED = "bundled"
 BOUND = 3.0
 HOPPING = {"search": "basin-hopping", "unloaded_beams": "keep"}
 SETS: dict[str, dict[str, Any]] = {
-    "short": {"runs": 60, "steps": 582, "seed": 210_000, "every": 4},
-    "long": {"runs": 24, "steps": 10_000, "seed": 200_000, "every": 20},
+    "582 steps": {"runs": 60, "steps": 582, "seed": 210_000, "every": 24},
+    "3,000 steps": {"runs": 24, "steps": 3000, "seed": 230_000, "every": 40},
+    "10,000 steps": {"runs": 24, "steps": 10_000, "seed": 200_000, "every": 120},
     "default search": {
-        "runs": 12, "steps": 25_000, "seed": 220_000, "every": 25, "search": HOPPING,
+        "runs": 12, "steps": 25_000, "seed": 220_000, "every": 100, "search": HOPPING,
     },
 }  # fmt: skip
 """Specifications of the held-out runs."""
@@ -54,7 +54,9 @@ def held_out(folder: Path, workers: int | None) -> Iterator[tuple[str, Dataset]]
     """Yield the held-out runs of each set; finished runs in the folder are used again."""
     for name, spec in SETS.items():
         whole = DatasetSpec(problem=find_problem(PROBLEM), **spec)
-        data = build_dataset(whole, folder / name.replace(" ", "-"), workers=workers)
+        data = build_dataset(
+            whole, folder / name.replace(" ", "-").replace(",", ""), workers=workers
+        )
         assert data is not None  # nothing stops it
         yield name, data
 
@@ -81,9 +83,8 @@ def main() -> None:
     }  # fmt: skip
     given = [each.split("=", 1) for each in options.set]
     record = json.loads(options.record.read_text()) if options.record.exists() else {"rows": []}
-    sets = [*held_out(options.folder, options.workers)]
-    sets += [(name, read_dataset(file)) for name, file in given]
-    for set_name, data in sets:
+    sets: list[tuple[str, Dataset]] = [(name, read_dataset(file)) for name, file in given]
+    for set_name, data in sets or held_out(options.folder, options.workers):
         for network, model in models.items():
             row = {"network": network, "set": set_name, **measure(model, data)}
             others = [old for old in record["rows"] if key_of(old) != key_of(row)]
@@ -131,7 +132,9 @@ def read_options() -> argparse.Namespace:
     parser.add_argument(
         "--network", action="append", default=[], help="NAME=FILE of a network [the bundled one]"
     )
-    parser.add_argument("--set", action="append", default=[], help="NAME=FILE of a dataset")
+    parser.add_argument(
+        "--set", action="append", default=[], help="NAME=FILE of a dataset [the held-out runs]"
+    )
     parser.add_argument(
         "--folder", type=Path, default=Path("surrogate-long-runs"), help="folder of the runs"
     )
