@@ -15,12 +15,13 @@ PAUSE = 0.15
 """Seconds after a click, in which the page answers."""
 NAMED = {"up", "down", "left", "right"}
 QUANTITIES = (
-    "gain", "travel", "off_axis", "rotation", "payload", "stiffness", "blocked_force", "sag",
+    "gain", "travel", "off_axis", "rotation", "payload", "dead_load", "stiffness", "blocked_force",
+    "sag",
 )  # fmt: skip
 USUAL = {
     "gain": "at_least", "travel": "at_least", "off_axis": "at_most", "rotation": "value",
-    "payload": "at_least", "stiffness": "at_least", "blocked_force": "at_least", "sag": "at_most",
-    "input_force": "at_most",
+    "payload": "at_least", "dead_load": "at_least", "stiffness": "at_least",
+    "blocked_force": "at_least", "sag": "at_most", "input_force": "at_most",
 }  # fmt: skip
 """Bound with which a quantity begins."""
 BOUNDS = ("at_least", "at_most", "target")

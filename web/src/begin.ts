@@ -27,7 +27,7 @@ export function exampleTask(): Task {
       name: "my part", domain: { size: [82, 72] }, supports: [{ at: [{ edge: "bottom" }] }],
       cases: [{
         inputs: [{ at: [{ point: [76, 70] }, { point: [66, 70] }], direction: "down", displacement: 3 }],
-        outputs: [{ at: [{ point: [6, 70] }, { point: [16, 70] }], direction: "left", gain: [{ maximise: true }], off_axis: [{ at_most: "10%" }], rotation: [{ value: "5 deg" }], payload: [{ at_least: "10 g" }], sag: [{ at_most: "10%" }] }],
+        outputs: [{ at: [{ point: [6, 70] }, { point: [16, 70] }], direction: "left", gain: [{ maximise: true }], off_axis: [{ at_most: "10%" }], rotation: [{ value: "5 deg" }], dead_load: [{ at_least: "10 g" }], sag: [{ at_most: "10%" }] }],
       }],
     },
     hand: null,
