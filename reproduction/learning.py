@@ -82,13 +82,13 @@ def _search(record: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _costs(record: Mapping[str, Any]) -> dict[str, Any]:
-    rows = [row for row in record["costs"] if row["where"] == "one core"]
-    single = {row["what"]: row["microseconds"] for row in rows if row["batch"] == 1}
+    rows = [row for row in record["costs"] if row["device"] == "one core"]
+    single = {row["method"]: row["microseconds"] for row in rows if row["batch"] == 1}
     return {
         "fire": single["`fire` response"],
         "newton": single["Newton response (default)"],
         "resnet18": min(
-            row["microseconds"] for row in rows if row["what"].startswith("resnet18-w16")
+            row["microseconds"] for row in rows if row["method"].startswith("resnet18-w16")
         ),
     }
 

@@ -101,14 +101,14 @@ def _network(model: Any) -> dict[str, Any]:
 
     The samples of the network that a training started from count, too.
     """
-    before = (model.record.get("start") or {}).get("designs", 0)
+    start = model.record.get("start") or {}
+    before = start.get("designs", 0)
+    epochs = [(each["designs"], each["r_squared"]) for each in start.get("epochs", [])]
+    epochs += [(each["designs"] + before, each["r_squared"]) for each in model.record["epochs"]]
     return {
         "network": model.architecture,
         "looks": model.record["designs"] + before,
-        "epochs": [
-            {"designs": each["designs"] + before, "r_squared": each["r_squared"]}
-            for each in model.record["epochs"]
-        ],
+        "epochs": [{"designs": designs, "r_squared": value} for designs, value in epochs],
     }
 
 
