@@ -95,6 +95,10 @@ export interface Motion {
   efficiency: (number | null)[];
   force: (number | null)[];
   snapped: boolean[];
+  /** Rotation of the first output that has several nodes, in degrees; in space its size. */
+  rotation: (number | null)[];
+  /** The model in words. */
+  model: string;
 }
 
 export interface Run {

@@ -27,7 +27,7 @@ const USUAL: Record<QuantityName, Usual> = {
 };
 
 const INPUT_FORCE: Usual = { title: "input force", bound: "at_most", example: "1 N", about: "Force of the input along its direction." };
-const ROTATION_IN_SPACE = "Size of the rotation of the output, about whatever axis it has.";
+const ROTATION_IN_SPACE = "Size of the mean rotation of the output nodes, about whatever axis it has; a rotational symmetry (Limits and tolerance) makes this the vertical axis. Nodes of an input move along its direction only: let the input be the middle of a plate that should turn.";
 
 /** Quantities that may be maximised. */
 const MAXIMISED: string[] = ["gain", "travel", "rotation", "payload", "dead_load", "stiffness", "blocked_force"];
@@ -216,7 +216,7 @@ function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HT
   return [
     ...(several ? [amount(`${key}-name`, "Name", each.name, "", (value) => set(editor, target, { name: value === undefined ? undefined : String(value) }))] : []),
     choice("Motion of the output", [["moves", "moves"], ["turns", "turns"]] as ["moves" | "turns", string][], turns ? "turns" : "moves", (picked) => set(editor, target, picked === "turns" ? TURN : MOTION), `motion-${target.index}`),
-    turns ? h("p", { class: "note" }, isSpatial(editor.task.table) ? ROTATION_IN_SPACE : "Its rotation counts: counter-clockwise is positive.") : directionFields(editor, target, each.direction),
+    turns ? h("p", { class: "note" }, isSpatial(editor.task.table) ? ROTATION_IN_SPACE : "The mean rotation of its nodes counts: counter-clockwise is positive.") : directionFields(editor, target, each.direction),
     h("div", { class: "wanted" }, ...rows, each.path ? pathRow(editor, each, target) : null,
       h("div", { class: "ask" }, h("span", {}, "Ask for"), add)),
     h("details", { ...(each.spring !== undefined ? { open: true } : {}) }, h("summary", { "data-key": `${key}-workpiece` }, "Workpiece that resists"),

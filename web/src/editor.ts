@@ -4,7 +4,7 @@ import { bitsOf, fetchRegistries, get, hexOf, isInSpace, post, ServerError, sess
 import { store, storedHistory, storedSettings, storeSettings, TASK_KEY } from "./begin";
 import { Canvas, type CanvasActions } from "./canvas";
 import { where } from "./drawing";
-import { announce, button, choice, clear, download, figure, h, iconButton } from "./dom";
+import { announce, button, choice, clear, count, download, figure, h, iconButton } from "./dom";
 import type { Fault, Settings, TaskEditor } from "./editing";
 import { Panels } from "./panels";
 import { SpaceCanvas } from "./spacecanvas";
@@ -217,14 +217,21 @@ export class Editor implements TaskEditor {
     const next = assign({ ...this.task, table }, now, loadCase, this.target, nodes, add);
     // The regions follow at once, since the next click may come before the server has answered.
     const gone = new Set(nodes);
+    const taken: string[] = [];
     for (const other of ["supports", "inputs", "outputs"] as const) {
       nodesOf(now, loadCase, other).forEach((known, k) => {
-        if (add && kind !== "loads" && known.some((node) => gone.has(node))) now = withRegion(now, loadCase, { kind: other, index: k }, known.filter((node) => !gone.has(node)));
+        const left = known.filter((node) => !gone.has(node));
+        if (!add || kind === "loads" || left.length === known.length) return;
+        if (other !== kind || k !== index) taken.push(`${count(known.length - left.length, "node")} of ${other.slice(0, -1)} ${k + 1}`);
+        now = withRegion(now, loadCase, { kind: other, index: k }, left);
       });
     }
     const known = nodesOf(built, loadCase, kind)[this.target.index] ?? [];
     this.built = withRegion(now, loadCase, this.target, add ? [...new Set([...known, ...nodes])] : known.filter((node) => !gone.has(node)));
     this.set({ ...next, hand: null }, this.pairing);
+    const text = taken.length ? `${sentence(`Taken over: ${taken.join(", ")}`)} A node belongs to one support, input or output.` : "";
+    clear(this.notice, text);
+    if (text) announce(text);
     if (!this.pairing && (kind === "inputs" || kind === "outputs")) this.pickImages(symmetry, kind, index, before, nodes, add);
   }
 

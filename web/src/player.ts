@@ -1,6 +1,6 @@
 // Animation of a design along its computed path, with amplification and colours.
 
-import { isInSpace, modelOf, post, type Motion, type Problem, type ToleranceFound } from "./api";
+import { isInSpace, post, type Motion, type Problem, type ToleranceFound } from "./api";
 import { bitsOf } from "./api";
 import { binned, BINS, Drawing, markRegions, sectionOf, where, type Group, type LatticeDrawing } from "./drawing";
 import { loadSpace } from "./loadspace";
@@ -289,9 +289,10 @@ export class Player {
     const stroke = motion.stroke === null ? `${figure(100 * this.part, 0)} % of the force` : `${figure(this.part * motion.stroke * this.scale, 2)} mm in`;
     const efficiency = motion.efficiency[near] ?? null;
     const out = efficiency === null || motion.stroke === null ? "" : `${figure(this.part * motion.stroke * this.scale * efficiency, 2)} mm out`;
-    const lines = [figure(efficiency, 3), modelOf(this.problem), stroke, out, motion.snapped[near] ? "after a snap-through" : ""];
-    if (this.readout.childElementCount !== 5) {
-      clear(this.readout, h("strong"), h("span"), h("span"), h("span"), h("span", { class: "alarm" }));
+    const turned = motion.rotation[near];
+    const lines = [figure(efficiency, 3), `output / input motion, ${motion.model}`, stroke, out, turned == null ? "" : `output turned by ${figure(turned, 1)}°`, motion.snapped[near] ? "after a snap-through" : ""];
+    if (this.readout.childElementCount !== 6) {
+      clear(this.readout, h("strong"), h("span"), h("span"), h("span"), h("span"), h("span", { class: "alarm" }));
     }
     lines.forEach((text, n) => {
       const line = this.readout.children[n]!;
@@ -335,7 +336,7 @@ export class Player {
       loss: "The loss of a strut costs: pale up to 10 % of the efficiency, then up to 30 %, up to 50 %, darkest more. Violet: the full stroke is not reached without it.",
       stress: this.picture ? `Von Mises stress, up to ${figure(Math.max(...sample(this.picture.stress)), 2)} MPa.` : "Check with finite elements to compute the stress.",
     };
-    const touching = this.touching.size && (this.colour === "plain" || this.colour === "energy") ? ` Bright red: ${this.touching.size} struts touch others along the stroke.` : "";
+    const touching = this.touching.size && (this.colour === "plain" || this.colour === "energy") ? ` Bright red: ${this.touching.size} struts touch others along the stroke; a bound on the clearance does not count struts that meet in a node.` : "";
     const text = `${texts[this.colour]}${touching}`;
     if (this.legend.textContent !== text) this.legend.textContent = text;
   }

@@ -196,7 +196,7 @@ export class RunPage {
     const phases = ["search", "verification", ...(specified ? ["refinement"] : [])];
     const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${done.toLocaleString("en")} geometries`)]] : [
       ...(running ? [["phase", `${phases.indexOf(phase) + 1} of ${phases.length}: ${phase}`]] as [string, string][] : []),
-      [specified ? "largest objective" : "best so far", this.bestText(run)],
+      [specified ? "largest objective of the search" : "best so far", this.bestText(run)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],
       ...(running && phase === "search" ? [["speed", this.update?.speed ? `${Math.round(this.update.speed).toLocaleString("en")} steps/s` : "starting …"], ["left of this phase", duration(this.update?.left)]] as [string, string][] : []),
       ...(running && tried && !refined ? [["candidates verified", `${tried[0]} of at most ${tried[1]}`]] as [string, string][] : []),
@@ -232,9 +232,9 @@ export class RunPage {
   }
 
   private bestText(run: Run): string {
-    const best = run.efficiency ?? this.chart.best;
-    if (run.efficiency === null && best !== null) return figure(best * this.unit, 3);
-    return best === null && this.run.problem.specification && this.chart.curves.size ? "no design meets all items yet" : figure(best, 3);
+    const { best } = this.chart;
+    if (!this.run.problem.specification) return figure(run.efficiency ?? best, 3);
+    return best !== null ? figure(best * this.unit, 3) : this.chart.curves.size ? "no design of the search meets all items" : "–";
   }
 
   /** Show why a search has no design, and suggestions. */

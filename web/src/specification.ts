@@ -55,13 +55,13 @@ export function figureColumns(models: [title: string, figures: PartFigures[]][])
 
 /** Motion, off-axis motion, rotation and load of each output, always beside each other. */
 export function figureTable(columns: FigureColumn[]): HTMLElement {
-  const rows: [string, (row: PartFigures) => string][] = [
+  const rows: [string, (row: PartFigures) => string, string?][] = [
     ["output / input motion", (row) => figure(row.efficiency, 2)],
     ["motion of the output", (row) => unit(row.travel_mm, 2, "mm")],
     ["off-axis motion", (row) => (row.off_axis == null ? "–" : `${figure(100 * row.off_axis, 1)} %${row.travel_mm == null ? "" : ` (${figure(row.off_axis * Math.abs(row.travel_mm), 2)} mm)`}`)],
     ["rotation of the output", (row) => unit(row.rotation_deg, 1, "°")],
-    ["payload that halves the motion: grows with the input", (row) => weight(row.payload_N)],
-    ["dead load that halves the motion: acts before the input", (row) => weight(row.dead_load_N)],
+    ["payload that halves the motion", (row) => weight(row.payload_N), "a load that grows with the input"],
+    ["dead load that halves the motion", (row) => weight(row.dead_load_N), "a weight that acts before the input"],
     ["sag under own weight", (row) => unit(row.sag_mm, 2, "mm")],
     ["largest input force", (row) => unit(row.largest_input_force_N, 2, "N")],
     ["largest strain", (row) => (row.strain == null ? "–" : `${figure(100 * row.strain, 1)} %`)],
@@ -69,7 +69,7 @@ export function figureTable(columns: FigureColumn[]): HTMLElement {
   return h("table", { class: "figures part" },
     h("caption", {}, "Figures of the part at full stroke; off-axis motion and rotation are the largest along it"),
     h("thead", {}, h("tr", {}, h("td"), ...columns.map(({ title }) => h("th", { scope: "col" }, title)))),
-    h("tbody", {}, ...rows.map(([name, text]) => h("tr", {}, h("th", { scope: "row" }, name), ...columns.map(({ row }) => h("td", {}, text(row)))))));
+    h("tbody", {}, ...rows.map(([name, text, about]) => h("tr", {}, h("th", { scope: "row" }, name, about && h("small", {}, about)), ...columns.map(({ row }) => h("td", {}, text(row)))))));
 }
 
 function weight(force: number | null | undefined): string {

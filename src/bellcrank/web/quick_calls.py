@@ -16,6 +16,7 @@ import numpy as np
 from bellcrank.errors import InvalidSettings
 from bellcrank.fem.results import finite
 from bellcrank.mechanics import VERIFICATION_INCREMENT, ModelEvaluator, Status, model_evaluator
+from bellcrank.mechanics.output import best_fit_rotation
 from bellcrank.model import Design, human_design, unpack_mask
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search import SpecificationEvaluator
@@ -23,6 +24,7 @@ from bellcrank.search.verdict import Verdict
 from bellcrank.search.verification import ELEMENTS
 from bellcrank.web.items import item_states, objective_states
 from bellcrank.web.task_files import problem_of
+from bellcrank.workflows.figures import model_words
 from bellcrank.workflows.part_figures import part_figures
 from bellcrank.workflows.specification import evaluated
 
@@ -33,8 +35,8 @@ if TYPE_CHECKING:
 
 CACHED = 24
 """Number of cached evaluators, a few hundred kilobytes each."""
-STATES = 41
-"""Number of states of a motion, from rest to the full stroke."""
+STATES = {2: 41, 3: 21}
+"""Number of states of a motion, from rest to the full stroke, in the plane and in space."""
 DIGITS = 5
 TASK_IN_SPACE = "straight-orthogonal"
 """A bundled task that needs the kernels of frames in space."""
@@ -178,7 +180,9 @@ def motion(text: str, mask: str, case: str = "") -> dict[str, Any]:
     if case and case not in cases:
         raise InvalidSettings(f"case: expected one of {', '.join(cases)}, got {case!r}")
     problem = cases[case or next(iter(cases))]
-    path = loading_path(replace(design, problem=problem), np.linspace(0.0, 1.0, STATES))
+    elements = None if problem.section is None else ELEMENTS
+    fractions = np.linspace(0.0, 1.0, STATES[problem.lattice.dimension])
+    path = loading_path(replace(design, problem=problem), fractions, elements=elements)
     peak = float(path.energy.max(initial=0.0)) or 1.0
     supports = problem.supports
     return {
@@ -193,7 +197,19 @@ def motion(text: str, mask: str, case: str = "") -> dict[str, Any]:
         "efficiency": [finite(each) for each in path.efficiency],
         "force": [finite(each) for each in path.input_force],
         "snapped": path.snapped.tolist(),
+        "rotation": _rotations(problem, path.displacement),
+        "model": model_words(problem, elements),
     }
+
+
+def _rotations(problem: Problem, displacement: NDArray[np.float64]) -> list[float | None]:
+    """Return the rotation of the first output with several nodes, degrees; in space its size."""
+    wide = [each.nodes for each in problem.outputs.values() if len(each.nodes) > 1]
+    if not wide:
+        return [None] * len(displacement)
+    rest = problem.lattice.positions[wide[0]]
+    found = [best_fit_rotation(rest, moved[wide[0]]) for moved in displacement]
+    return [round(float(np.linalg.norm(each) if each.ndim else each), 2) for each in found]
 
 
 def sensitivity(text: str, mask: str) -> dict[str, Any]:
