@@ -58,13 +58,13 @@ export function figureTable(columns: FigureColumn[]): HTMLElement {
   const rows: [string, (row: PartFigures) => string, string?][] = [
     ["output / input motion", (row) => figure(row.efficiency, 2)],
     ["motion of the output", (row) => unit(row.travel_mm, 2, "mm")],
-    ["off-axis motion", (row) => (row.off_axis == null ? "–" : `${figure(100 * row.off_axis, 1)} %${row.travel_mm == null ? "" : ` (${figure(row.off_axis * Math.abs(row.travel_mm), 2)} mm)`}`)],
+    ["off-axis motion", (row) => (row.off_axis == null ? "–" : `${figure(100 * row.off_axis, 1)}\u00a0%${row.travel_mm == null ? "" : ` (${figure(row.off_axis * Math.abs(row.travel_mm), 2)}\u00a0mm)`}`)],
     ["rotation of the output", (row) => unit(row.rotation_deg, 1, "°")],
     ["payload that halves the motion", (row) => weight(row.payload_N), "a load that grows with the input"],
     ["dead load that halves the motion", (row) => weight(row.dead_load_N), "a weight that acts before the input"],
     ["sag under own weight", (row) => unit(row.sag_mm, 2, "mm")],
     ["largest input force", (row) => unit(row.largest_input_force_N, 2, "N")],
-    ["largest strain", (row) => (row.strain == null ? "–" : `${figure(100 * row.strain, 1)} %`)],
+    ["largest strain", (row) => (row.strain == null ? "–" : `${figure(100 * row.strain, 1)}\u00a0%`)],
   ];
   return h("table", { class: "figures part" },
     h("caption", {}, "Figures of the part at full stroke; off-axis motion and rotation are the largest along it"),
@@ -73,9 +73,9 @@ export function figureTable(columns: FigureColumn[]): HTMLElement {
 }
 
 function weight(force: number | null | undefined): string {
-  return force === undefined ? "–" : force === null ? "none" : `${figure((1000 * force) / 9.80665, 0)} g (${figure(force, 3)} N)`;
+  return force === undefined ? "–" : force === null ? "none" : `${figure((1000 * force) / 9.80665, 0)}\u00a0g (${figure(force, 3)}\u00a0N)`;
 }
 
 function unit(value: number | null | undefined, digits: number, name: string): string {
-  return value === null || value === undefined ? "–" : `${figure(value, digits)}${name === "°" ? "" : " "}${name}`;
+  return value === null || value === undefined ? "–" : `${figure(value, digits)}${name === "°" ? "" : "\u00a0"}${name}`;
 }
