@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import trimesh
 
 from bellcrank.export import Export, exporters, slicer
 from bellcrank.export.gcode import read_gcode
@@ -92,12 +94,32 @@ def test_bad_input_is_refused_in_one_line(words: tuple[str, ...], word: str) -> 
     assert word in refusal("export", *words)
 
 
-def test_a_plate_or_pad_without_a_hole_to_fill_is_refused(here: Path) -> None:
+def test_supports_and_inputs_in_one_row_get_a_plate_and_a_pad_outside_of_the_part(
+    here: Path,
+) -> None:
     task = find_task("slider")  # supports in one row, an input of two nodes
     assert task is not None
     write_design(task.problem.full_design(), here / "slider.json")
-    for option, word in (("--plate", "plate: no hole"), ("--pad", "pad: no hole")):
-        assert word in refusal("export", "slider.json", "part.stl", option)
+    sizes = {}
+    for name, options in {
+        "plain": (), "plate": ("--plate", "--screws", "2"), "pad": ("--pad",)
+    }.items():  # fmt: skip
+        assert call("export", "slider.json", f"{name}.stl", *options).code == 0
+        sizes[name] = np.ptp(trimesh.load(here / f"{name}.stl").vertices, axis=0)
+    # Room for screws of 3.4 mm with 1.5 mm around them, beyond the struts.
+    assert sizes["plate"][1] - sizes["plain"][1] == pytest.approx(6.4 + 2.0, abs=0.1)
+    assert sizes["pad"][1] - sizes["plain"][1] == pytest.approx(6.4 + 2.0, abs=0.1)
+    assert sizes["plate"][0] == pytest.approx(sizes["plain"][0], abs=0.1)
+
+
+def test_a_pad_without_a_hole_to_fill_is_refused(here: Path) -> None:
+    task = find_task("slider")
+    assert task is not None
+    given = task.problem.input
+    one = replace(given, nodes=given.nodes[:1], direction=given.direction[:1])
+    problem = replace(task.problem, input=one, specification=None)
+    write_design(problem.full_design(), here / "slider.json")
+    assert "pad: no hole" in refusal("export", "slider.json", "part.stl", "--pad")
     assert not (here / "part.stl").exists()
 
 
