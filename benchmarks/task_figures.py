@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bellcrank.part.units import GRAVITY
 from bellcrank.provenance import provenance
@@ -17,9 +17,6 @@ from bellcrank.task import bundled_tasks, find_task, units_of
 from bellcrank.workflows.part_figures import part_figures
 from benchmarks.tasks import recorded_design
 from tools.draw_tasks import identity, recorded_runs
-
-if TYPE_CHECKING:
-    from bellcrank.task import ProblemUnits
 
 RECORD = Path(__file__).parents[1] / "docs" / "tasks" / "figures.json"
 FIGURES = (
@@ -46,26 +43,18 @@ def rows_of(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
         units = units_of(task.problem, task.part)
         assert task.problem.specification is not None
         payloads = {
-            (item.case, item.output): item.at_least
+            (item.case, item.output): units.in_part("force", item.at_least)
             for item in task.problem.specification.items
-            if item.quantity == "payload"
+            if item.quantity == "payload" and item.at_least is not None
         }
-
-        def wanted(
-            row: dict[str, Any],
-            payloads: dict[tuple[str, str], float | None] = payloads,
-            units: ProblemUnits = units,
-        ) -> float | None:
-            force = payloads.get((row["case"], row["output"]))
-            return None if force is None else units.in_part("force", force)
-
         rows.append(
             {
                 "task": name,
                 "design": identity(first),
                 "in_space": task.problem.lattice.dimension == 3,
                 "outputs": [
-                    {key: each.get(key) for key in FIGURES} | {"wanted_payload_N": wanted(each)}
+                    {key: each.get(key) for key in FIGURES}
+                    | {"wanted_payload_N": payloads.get((each["case"], each["output"]))}
                     for each in found
                 ],
                 "met": first["met"],

@@ -107,4 +107,3 @@ def test_all_quantities_in_the_sheet_are_near_those_of_frames() -> None:
             assert found[key] == pytest.approx(frame[key], rel=limit, abs=1e-3), key
     # The sag is that of the output whose specification bounds it.
     assert [each["sag_mm"] is not None for each in figures] == [True, False, False]
-

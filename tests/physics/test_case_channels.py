@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from bellcrank.mechanics import CaseEvaluator, Channel, FrameEvaluator
-from bellcrank.mechanics.frames.case import CHANNELS, LOADED, with_payload
+from bellcrank.mechanics.frames.case import CHANNELS, LOADED
+from bellcrank.mechanics.frames.output_loads import with_payload
 from bellcrank.model import (
     Loads,
     NodeSpring,

@@ -11,8 +11,8 @@ import pytest
 from bellcrank.fem.frame.equations import FrameEquations, part_frame
 from bellcrank.fem.path import Linearisation, PathStatus, follow_path
 from bellcrank.mechanics import VERIFICATION_INCREMENT, CaseEvaluator, Channel, Status
-from bellcrank.mechanics.frames.case import resisting_force, with_output
-from bellcrank.model.stroke_ranges import rate_at
+from bellcrank.mechanics.frames.output_loads import resisting_force, with_output
+from bellcrank.model.stroke_ranges import delayed
 from bellcrank.task import find_task
 from benchmarks.tasks import recorded_design
 from tools.draw_tasks import best, recorded_runs
@@ -39,7 +39,8 @@ class DeadLoadEquations(FrameEquations):
     """A frame on which a weight acts in the first half of the load, and the input in the second."""
 
     def __init__(self, frame: PartFrame, weight: NDArray[np.float64]) -> None:
-        super().__init__(replace(frame, ramps=HALF + HALF * frame.ramps))
+        assert not frame.load.any()
+        super().__init__(replace(frame, ramps=delayed(frame.ramps, HALF)))
         self.weight = weight
 
     @property
@@ -47,23 +48,16 @@ class DeadLoadEquations(FrameEquations):
         return (HALF,)
 
     def linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearisation:
-        displacement = self.displacement(unknowns, load)
-        force, tangent = self._beams(displacement)
-        weight = min(1.0, load / HALF) * self.weight
-        residual = (self._sum(force, displacement) - weight).ravel()[self.free]
-        magnitude = float(np.abs(force[:, [0, 1, 3, 4]]).max())
-        tolerance = self._residual_tolerance(displacement, magnitude)
-        return Linearisation(residual, tolerance, self._factor(tangent))
+        found = super().linearise(unknowns, load)
+        weight = min(1.0, load / HALF) * self.weight.ravel()[self.free]
+        return replace(found, residual=found.residual - weight)
 
     def load_derivative(
         self, unknowns: NDArray[np.float64], load: float, toward: float = 1.0
     ) -> NDArray[np.float64]:
-        _, tangent = self._beams(self.displacement(unknowns, load))
-        drive = rate_at(self.frame.ramps, load, toward)[:, None] * self.frame.drive
-        force = self._sum(self._linear_force(tangent, drive), drive)
-        if min(load, toward) < HALF:
-            force = force - self.weight / HALF
-        return force.ravel()[self.free]
+        rate = super().load_derivative(unknowns, load, toward)
+        grows = min(load, toward) < HALF
+        return rate - grows * self.weight.ravel()[self.free] / HALF
 
 
 def recorded(name: str) -> Loaded:

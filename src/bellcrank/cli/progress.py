@@ -39,7 +39,7 @@ class SearchProgress(Live):
         self._made = self._accepted = 0
         self._temperature = 0.0
         self._geometries: GeometryCount | None = None
-        self._refined = -math.inf
+        self._best_refined = -math.inf
         self._start = time.monotonic()
         super().__init__("searching", self._total, TextColumn("left"), TimeRemainingColumn())
 
@@ -74,10 +74,10 @@ class SearchProgress(Live):
                 self._bar.update(self._task, description="refining ")
             self._geometries.add(number, step.evaluations)
             if step.rows.violation <= MET:
-                self._refined = max(self._refined, step.rows.objective)
+                self._best_refined = max(self._best_refined, step.rows.objective)
             done, most = self._geometries.done, max(self._geometries.done, self._geometries.most)
-            best = f"best objective {self._refined:.3f}"
-            figures = best if math.isfinite(self._refined) else "no design meets all items yet"
+            best = f"best objective {self._best_refined:.3f}"
+            figures = best if math.isfinite(self._best_refined) else "no design meets all items yet"
             if step.sheets:
                 figures += f", design {number + 1} in the better model"
             line = f"refining: {done} of at most {most} geometries, {figures}"

@@ -18,11 +18,15 @@ from bellcrank.fem.continuum.space_mesh import space_mesh
 from bellcrank.fem.continuum.system import continuum_system
 from bellcrank.fem.path import PathState, PathStatus, StepControl, follow_path
 from bellcrank.mechanics import Channel, StrokeRecord, channels_of, item_results
-from bellcrank.mechanics.frames.case import resisting_force, with_output, with_payload
-from bellcrank.mechanics.frames.stroke import with_held_output
-from bellcrank.mechanics.items import forces_of
+from bellcrank.mechanics.frames.output_loads import (
+    resisting_force,
+    with_held_output,
+    with_output,
+    with_payload,
+)
 from bellcrank.mechanics.output import best_fit_rotation, motion_weights
 from bellcrank.mechanics.splines import stroke_spline
+from bellcrank.mechanics.stroke_record import forces_of
 from bellcrank.search.strut_loss import StrutLosses
 
 if TYPE_CHECKING:

@@ -35,9 +35,6 @@ from bellcrank.mechanics.frames.quantities import quantities
 from bellcrank.mechanics.frames.stroke import Quantities
 from bellcrank.mechanics.items import (
     ItemResult,
-    StrokeRecord,
-    channels_of,
-    has_channels,
     item_results,
     margin,
     quantity_values,
@@ -63,6 +60,7 @@ from bellcrank.mechanics.objectives import (
 from bellcrank.mechanics.output import OutputMotion, output_motion
 from bellcrank.mechanics.status import Outcome, Status
 from bellcrank.mechanics.stroke import StrokeEvaluator, at_fraction, increment_at
+from bellcrank.mechanics.stroke_record import StrokeRecord, channels_of, has_channels
 from bellcrank.mechanics.superelement import Condensed, State, Superelement, state_of
 
 __all__ = [

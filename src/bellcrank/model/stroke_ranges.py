@@ -131,6 +131,18 @@ def rate_at(ranges: NDArray[np.float64], fraction: float, toward: float) -> NDAr
     return np.where(moves, 1.0 / (end - begin), 0.0)
 
 
+def delayed(ranges: NDArray[np.float64], start: float) -> NDArray[np.float64]:
+    """Return ranges (n, 2) of an input that begins at a fraction of the load.
+
+    Examples
+    --------
+    >>> delayed(np.array([[0.0, 0.5], [0.5, 1.0]]), 0.2)
+    array([[0.2, 0.6],
+           [0.6, 1. ]])
+    """
+    return start + (1.0 - start) * ranges
+
+
 def kinks_of(ranges: NDArray[np.float64]) -> tuple[float, ...]:
     """Return the fractions within the stroke at which an input starts or stops, ascending.
 

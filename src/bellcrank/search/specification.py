@@ -23,7 +23,8 @@ from bellcrank.mechanics import (
     tightened,
     violation,
 )
-from bellcrank.mechanics.items import TOLERANCE, forces_of, reduced, relative_distance
+from bellcrank.mechanics.items import TOLERANCE, reduced, relative_distance
+from bellcrank.mechanics.stroke_record import forces_of
 from bellcrank.search.clearance import gap_less_overlaps
 from bellcrank.search.constraints.evaluator import BASE_PENALTY
 from bellcrank.search.given import GivenQuantities

@@ -9,15 +9,14 @@ from bellcrank.workflows.find import find_design
 from bellcrank.workflows.report import DesignReport
 from bellcrank.workflows.validation import (
     Validation,
-    add_to_record,
     check_plan,
     problem_identity,
-    read_record,
     spec_for,
     validate,
     with_stroke,
     without_missing_levels,
 )
+from bellcrank.workflows.validation_record import add_to_record, read_record
 
 __all__ = [
     "DesignReport",

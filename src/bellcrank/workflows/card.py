@@ -20,7 +20,8 @@ from bellcrank.workflows.fabricate import profile_for, size_and_volume
 from bellcrank.workflows.figures import figure_text, figures_of, model_words
 from bellcrank.workflows.pictures import stressed_part, stroke_labels
 from bellcrank.workflows.specification import item_rows
-from bellcrank.workflows.validation import problem_identity, read_record, validate
+from bellcrank.workflows.validation import problem_identity, validate
+from bellcrank.workflows.validation_record import read_record
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -47,7 +47,8 @@ from bellcrank.workflows.refinement import refine_selection, refinement_data, wi
 from bellcrank.workflows.report import RESULTS, DesignReport
 from bellcrank.workflows.report_tables import write_report
 from bellcrank.workflows.tolerance import compute_tolerance, deviations_of
-from bellcrank.workflows.validation import Validation, replace_record, validate
+from bellcrank.workflows.validation import Validation, validate
+from bellcrank.workflows.validation_record import replace_record
 
 if TYPE_CHECKING:
     import threading

@@ -16,7 +16,8 @@ from bellcrank.mechanics import StrokeEvaluator, model_evaluator
 from bellcrank.model import require_plane
 from bellcrank.model.storage import already_exists, check_folder, write_bytes
 from bellcrank.part.outline import strut_outline
-from bellcrank.part.outline.grips import filled, with_outer_rows, with_pointer
+from bellcrank.part.outline.grips import filled, with_pointer
+from bellcrank.part.outline.outer_rows import with_outer_rows
 from bellcrank.part.outline.screws import drilled, screw_positions
 from bellcrank.part.pieces import check_supported, connection_warnings
 from bellcrank.workflows.loading import loading_path

@@ -16,7 +16,7 @@ from bellcrank.mechanics import (
     StrokeRecord,
 )
 from bellcrank.mechanics.frames.analysis import strain_amplitude
-from bellcrank.mechanics.frames.case import with_output
+from bellcrank.mechanics.frames.output_loads import with_output
 from bellcrank.task import units_of
 
 if TYPE_CHECKING:

@@ -47,12 +47,14 @@ DEPARTURE = 0.2
 
 
 class GeometryCount:
-    """Number of geometries of the refinements of several designs of a search.
+    """Number of geometries of the refinements of several designs.
 
     Parameters
     ----------
     chains
-        Number of chains of the search.
+        Number of chains of the search that found them.
+    most
+        Largest number of geometries, if it is given.
 
     Examples
     --------
@@ -63,8 +65,8 @@ class GeometryCount:
     (120, 800)
     """
 
-    def __init__(self, chains: int) -> None:
-        self._chains = chains
+    def __init__(self, chains: int = 1, most: int | None = None) -> None:
+        self._chains, self._most = chains, most
         self._latest: dict[int, int] = {}
         self._before = 0
 
@@ -82,7 +84,9 @@ class GeometryCount:
 
     @property
     def most(self) -> int:
-        """Usual largest number; a part may need some more in its better model."""
+        """Largest number; in a search the usual one, beyond which a better model may lead."""
+        if self._most is not None:
+            return self._most
         first = max(len(self._latest), STARTS * self._chains)
         return FIRST_EVALUATIONS * first + EVALUATIONS * self._chains
 

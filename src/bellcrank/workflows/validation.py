@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
-import os
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from bellcrank.errors import InvalidFile, InvalidSettings
+from bellcrank.errors import InvalidSettings
 from bellcrank.fem import FemSettings, levels
 from bellcrank.fem.results import finite
 from bellcrank.mechanics import (
@@ -18,20 +16,16 @@ from bellcrank.mechanics import (
     model_name,
     objective_name,
 )
-from bellcrank.model.parsing import read_json
-from bellcrank.model.storage import write_text
 from bellcrank.part import PartSpec, read_length
 from bellcrank.part.pieces import check_supported, connection_warnings
 from bellcrank.provenance import provenance
 from bellcrank.search.verification import ELEMENTS
-from bellcrank.storage.locking import locked
 from bellcrank.workflows.figures import model_words
 from bellcrank.workflows.part_figures import SHEET_QUANTITIES, part_figures, sheet_figures
 from bellcrank.workflows.specification import item_data, results_for
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
     from bellcrank.fem import Analysis
     from bellcrank.machines.bundled.contact import ContactCheck
@@ -41,8 +35,6 @@ if TYPE_CHECKING:
     Plan = Sequence[tuple[str, FemSettings]]
 
 SCHEMA = "bellcrank/validation/1"
-KEY = ("level", "theory", "linear", "settings", "part")
-"""Entries in which two analyses of a design that are the same agree."""
 TOP = (
     "level", "theory", "linear", "status", "reached", "efficiency",
     "mean_output_displacement_mm", "input_force_N", "input_push_N", "energy_N_mm",
@@ -311,85 +303,6 @@ def validate(
         validation = with_specification(validation)
         save(validation)
     return validation
-
-
-def read_record(path: Path, problem: str, mask: str) -> list[dict[str, Any]]:
-    """Return the analyses in a record; an empty list if the file does not exist.
-
-    Parameters
-    ----------
-    path
-        File of the record.
-    problem, mask
-        Identity of the design (`problem_identity`) and its mask in hexadecimal.
-
-    Raises
-    ------
-    InvalidFile
-        If the file is not a valid record, or the record of another design.
-    """
-    if not os.path.lexists(path):
-        return []
-    data = read_json(path)
-    results = data.get("results")
-    complete = isinstance(results, list) and all(
-        isinstance(entry, dict) and all(key in entry for key in KEY) for entry in results
-    )
-    if data.get("schema") != SCHEMA or not complete:
-        raise InvalidFile(
-            f"{path}: expected a record of {SCHEMA}, to which an analysis can be added; remove it, "
-            "or name another file with --record"
-        )
-    if (data.get("problem_hash"), data.get("mask")) != (problem, mask):
-        raise InvalidFile(
-            f"{path}: record of another design or of a changed problem; remove it, or name "
-            "another file with --record"
-        )
-    assert isinstance(results, list)
-    return results
-
-
-def add_to_record(validation: Validation, path: Path) -> None:
-    """Add a validation to the record of its design; repeated analyses replace earlier ones.
-
-    Raises
-    ------
-    InvalidFile
-        If the file is not a record of this design.
-    StorageError
-        If the file cannot be written.
-    """
-    data = validation.to_dict()
-    with locked(path.with_name(f".{path.name}.lock")):
-        old = read_record(path, data["problem_hash"], data["mask"])
-        new = [_key(entry) for entry in data["results"]]
-        others = [entry for entry in old if _key(entry) not in new]
-        record = {key: data[key] for key in ("schema", "problem", "problem_hash", "mask")}
-        if "specification" in data:
-            record["specification"] = data["specification"]
-        record |= {"results": [*others, *data["results"]], "provenance": data["provenance"]}
-        write_text(path, json.dumps(record, indent=1) + "\n", overwrite=True)
-
-
-def replace_record(validation: Validation, path: Path) -> None:
-    """Add a validation to the record of its design, and remove a record of another design.
-
-    Raises
-    ------
-    StorageError
-        If the file cannot be written.
-    """
-    data = validation.to_dict()
-    try:
-        read_record(path, data["problem_hash"], data["mask"])
-    except InvalidFile:
-        path.unlink()
-    add_to_record(validation, path)
-
-
-def _key(entry: dict[str, Any]) -> str:
-    """Return the identity of an analysis."""
-    return json.dumps([entry[key] for key in KEY], sort_keys=True)
 
 
 def check_contact(design: Design) -> ContactCheck:

@@ -12,7 +12,8 @@ from bellcrank.errors import InvalidSettings
 from bellcrank.model import find_problem, human_design
 from bellcrank.part import PartSpec
 from bellcrank.part.outline import Loop, Outline, room_for_fillet, strut_outline
-from bellcrank.part.outline.grips import filled, with_outer_rows, with_pointer
+from bellcrank.part.outline.grips import filled, with_pointer
+from bellcrank.part.outline.outer_rows import with_outer_rows
 from bellcrank.part.outline.screws import clearance, drilled, screw_positions
 from tests.part.outline.layouts import random_layout, triangular
 
@@ -105,6 +106,23 @@ def test_a_row_of_nodes_at_the_boundary_gets_a_plate_outside_of_the_part() -> No
     low, high = whole[block].min(axis=0), whole[block].max(axis=0)
     grid = np.stack(np.meshgrid(*np.linspace(low, high, 40).T), axis=-1).reshape(-1, 2)
     assert (clearance(plate, grid) > 0.5).all()
+
+
+def test_each_row_gets_its_own_plate() -> None:
+    positions, beams = triangular(8, 4)
+    x, y = np.asarray(positions).T
+    bottom = np.flatnonzero(y < 1e-9)
+    left, right = bottom[np.argsort(x[bottom])[:3]], bottom[np.argsort(x[bottom])[-2:]]
+    top = np.flatnonzero(y > y.max() - 1e-9)[:2]
+    nodes = [*left, *right, *top]
+    whole, struts, block = with_outer_rows(positions, beams, nodes, depth=6.0, reach=18.0)
+    added = whole[len(positions) :]
+    assert np.array_equal(block, [*nodes, *range(len(positions), len(whole))])
+    assert sorted(added[:, 1].round(6)) == pytest.approx([-6.0] * 5 + [y.max() + 6.0] * 2)
+    outline = strut_outline(whole, struts, 2.0, 0.2)
+    plates = filled(outline, whole, struts, block)
+    holes = strut_outline(positions, beams, 2.0, 0.2).hole_count
+    assert (plates.piece_count, plates.hole_count) == (1, holes)
 
 
 def test_nodes_inside_of_a_part_or_in_several_rows_get_no_row() -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from bellcrank.fem.continuum.backend import ngsolve
 from bellcrank.fem.continuum.laws import lame_of, laws
 from bellcrank.mechanics.frames.system import DEAD
-from bellcrank.model.stroke_ranges import WHOLE
+from bellcrank.model.stroke_ranges import WHOLE, delayed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -122,7 +122,7 @@ def boundary_of(
     total = np.zeros(problem.lattice.positions.shape)
     if given.drive == "displacement":
         full = given.amount * part.scale * given.direction[present]
-        ranges = (start + (1.0 - start) * given.ranges[present]).tolist()
+        ranges = delayed(given.ranges[present], start).tolist()
         for node, motion, during in zip(
             given.nodes[present].tolist(), full.tolist(), ranges, strict=True
         ):

@@ -14,13 +14,17 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from bellcrank.mechanics.frames.evaluator import FrameEvaluator
+from bellcrank.mechanics.frames.output_loads import (
+    resisting_force,
+    with_held_output,
+    with_output,
+    with_payload,
+)
 from bellcrank.mechanics.frames.quantities import quantities
 from bellcrank.mechanics.frames.quantities.definition import Quantity, linear, vector
 from bellcrank.mechanics.frames.quantities.forces import mean_displacement_fields
 from bellcrank.mechanics.frames.quantities.motion import input_field, output_fields
-from bellcrank.mechanics.frames.stroke import with_held_output
 from bellcrank.mechanics.status import Status
-from bellcrank.model import Loads, NodeForce, Specification
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -60,61 +64,6 @@ LOADED = ("loaded_motion", "carried_motion")
 """Channels under a force on the output."""
 END_ONLY = frozenset({"stiffness", "blocked_force", *LOADED, "sag"})
 """Channels with a single value: at full stroke, or at rest."""
-
-
-def with_output(problem: Problem, name: str) -> Problem:
-    """Return a problem whose primary output is the one of a name; all springs remain.
-
-    Examples
-    --------
-    >>> from bellcrank.model import find_problem
-    >>> from bellcrank.part import PartSpec, frame_problem
-    >>> crane = frame_problem(find_problem("crane"), PartSpec())
-    >>> with_output(crane, "output") is crane
-    True
-    """
-    outputs = problem.outputs
-    if name == next(iter(outputs)):
-        return problem
-    case = "case" if problem.specification is None else problem.specification.case
-    others = {key: output for key, output in outputs.items() if key != name}
-    return replace(
-        problem, output=outputs[name],
-        specification=Specification(case=case, output=name, outputs=others),
-    )  # fmt: skip
-
-
-def with_payload(problem: Problem, force: float) -> Problem:
-    """Return a problem with a force on its output against the wanted direction.
-
-    Parameters
-    ----------
-    force
-        Total force, shared equally by the output nodes.
-
-    Examples
-    --------
-    >>> from bellcrank.model import find_problem
-    >>> from bellcrank.part import PartSpec, frame_problem
-    >>> crane = frame_problem(find_problem("crane"), PartSpec())
-    >>> with_payload(crane, 0.1).loads.forces[0].force.sum(axis=0).round(3)
-    array([0.1, 0. ])
-    """
-    given = problem.loads
-    forces = (*given.forces, resisting_force(problem, force))
-    return replace(problem, loads=Loads(forces, given.springs, given.weight))
-
-
-def resisting_force(problem: Problem, force: float) -> NodeForce:
-    """Return a force on the output of a problem against the wanted direction.
-
-    Parameters
-    ----------
-    force
-        Total force, shared equally by the output nodes.
-    """
-    output = problem.output
-    return NodeForce(output.nodes, -force / len(output.nodes) * output.direction)
 
 
 def bound_to(quantity: Quantity, problem: Problem) -> Quantity:

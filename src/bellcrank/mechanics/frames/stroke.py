@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics.frames.evaluator import FrameEvaluator
+from bellcrank.mechanics.frames.output_loads import with_held_output
 from bellcrank.mechanics.frames.quantities import quantities
 from bellcrank.mechanics.status import Status
 
@@ -20,22 +21,6 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.frames.equilibria import Equilibrium
     from bellcrank.mechanics.frames.flips import FlipChanges
     from bellcrank.mechanics.frames.quantities import Load, Measures, Quantity
-    from bellcrank.model import Problem
-
-STOP_STIFFNESS = 2e5
-"""Stiffness of the springs that hold the output, over the axial stiffness of a beam as long as it
-is wide: it does not depend on the geometry, by which blocked forces are differentiated."""
-
-
-def with_held_output(problem: Problem) -> Problem:
-    """Return a problem whose output is held by stiff springs of the kind that it has.
-
-    Along the wanted direction by default, in all directions for isotropic springs.
-    """
-    assert problem.section is not None
-    assert problem.material is not None
-    axial = problem.material.young * problem.section.area / problem.section.width
-    return replace(problem, output=replace(problem.output, spring=STOP_STIFFNESS * axial))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

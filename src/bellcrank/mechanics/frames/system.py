@@ -24,7 +24,7 @@ from bellcrank.mechanics.frames.kernels.arrays import (
 )
 from bellcrank.mechanics.ordering import elimination_order, factor_size
 from bellcrank.mechanics.system import EFFICIENCY_TOLERANCE, incident_beams
-from bellcrank.model.stroke_ranges import WHOLE
+from bellcrank.model.stroke_ranges import WHOLE, delayed, kinks_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -237,11 +237,12 @@ def build_frame(
     held = held_unknowns(problem, nodes, size)
     any_held, all_held = np.asarray(held.any(axis=1)), np.asarray(held.all(axis=1))
     drive, load = drive_and_load(problem, nodes, size)
-    hung, start = np.zeros((nodes, size)), 0.0
+    dead, start = np.zeros((nodes, size)), 0.0
     if dead_load is not None:
-        hung[dead_load.nodes, :dimension] = dead_load.force
+        dead[dead_load.nodes, :dimension] = dead_load.force
         start = DEAD
-    kinks = [start + (1.0 - start) * kink for kink in problem.input.kinks]
+    ramps = delayed(drive_ramps(problem, nodes), start)
+    kinks = kinks_of(ramps)
     protected = any_held.astype(np.uint8)
     protected[problem.special_nodes] = 1
     grounded, prescribed = np.zeros(nodes, np.uint8), np.zeros(nodes, np.uint8)
@@ -282,11 +283,11 @@ def build_frame(
         partly=(any_held & ~all_held).astype(np.uint8),
         block=elimination_order(beams, all_held, springs=False),
         drive=drive,
-        ramp=start + (1.0 - start) * drive_ramps(problem, nodes),
-        has_ramps=problem.input.during is not None or start > 0.0,
-        kinks=np.array([start, *kinks] if start else kinks, dtype=np.float64),
+        ramp=ramps,
+        has_ramps=len(kinks) > 0,
+        kinks=np.array(kinks, dtype=np.float64),
         load=load,
-        dead_load=hung,
+        dead_load=dead,
         start=start,
         weight=of_beam,
         has_weight=weight is not None,

@@ -7,7 +7,6 @@ additional strut at the output makes its motion visible. Lines and arcs remain e
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,8 +23,6 @@ if TYPE_CHECKING:
 
 _CLOSE = 1e-6
 """Relative tolerance of equal distances."""
-_ROW_WIDTH = 1e-3
-"""Width of a row of nodes on a line over its length."""
 
 
 def filled(
@@ -99,112 +96,6 @@ def filled(
     gone = np.ones(len(probes), dtype=np.bool_)
     gone[hole[probe[bounds & ~inner[strut] & ~at_node]]] = False
     return _without_holes(outline, gone)
-
-
-def with_outer_rows(
-    positions: ArrayLike,
-    beams: ArrayLike,
-    nodes: ArrayLike,
-    depth: float,
-    reach: float,
-    margin: float = 0.0,
-) -> tuple[Reals, Ids, Ids]:
-    """Return nodes and beams with a row of nodes outside of each row of given nodes.
-
-    Nodes in a row at the boundary enclose no holes. A second row of nodes outside, joined to them
-    by struts, encloses holes that `filled` makes a plate. Rows are of two or more nodes on a line;
-    a row with struts on both sides gets none.
-
-    Parameters
-    ----------
-    positions : (N, 2) array_like, mm
-        Nodes.
-    beams : (M, 2) array_like of int
-        The two nodes of each strut.
-    nodes : (k,) array_like of int
-        Nodes of the block, for example all supports.
-    depth : float, mm
-        Distance of the new rows.
-    reach : float, mm
-        Largest distance of neighbours in a row.
-    margin : float, mm
-        Distance to be left between the new row and other nodes.
-
-    Returns
-    -------
-    (N + n, 2) float64, mm, and (M + m, 2) int64
-        Arguments for `strut_outline`.
-    (k + n,) int64
-        Nodes of the block with the new ones.
-
-    Raises
-    ------
-    InvalidSettings
-        If a node does not exist.
-
-    Examples
-    --------
-    >>> positions, beams, block = with_outer_rows(
-    ...     [[0, 0], [10, 0], [5, 8]], [[0, 2], [1, 2]], [0, 1], depth=6.0, reach=12.0
-    ... )
-    >>> positions[3:].tolist(), block.tolist()
-    ([[0.0, -6.0], [10.0, -6.0]], [0, 1, 3, 4])
-    >>> beams[2:].tolist()
-    [[0, 1], [0, 3], [1, 4], [3, 4], [0, 4]]
-    """
-    from scipy.sparse.csgraph import connected_components
-
-    places, pairs = np.asarray(positions, dtype=np.float64), np.asarray(beams, dtype=np.int64)
-    block = read_nodes(nodes, len(places))
-    apart = np.linalg.norm(places[block][:, None] - places[block], axis=2)
-    count, row_of = connected_components(apart <= reach, directed=False)
-    known = {tuple(sorted(pair)) for pair in pairs.tolist()}
-    whole = places
-    added: list[list[int]] = []
-    for row in range(count):
-        line = _outer_line(places, pairs, block[row_of == row], depth, margin)
-        if line is None:
-            continue
-        own, outward = line
-        first = len(whole)
-        whole = np.vstack([whole, places[own] + depth * outward])
-        new = list(range(first, len(whole)))
-        block = np.concatenate([block, new])
-        added += [[a, b] for a, b in pairwise(own.tolist()) if (min(a, b), max(a, b)) not in known]
-        added += [[a, b] for a, b in zip(own.tolist(), new, strict=True)]
-        added += [[a, b] for a, b in pairwise(new)]
-        added += [[a, b] for a, b in zip(own.tolist(), new[1:], strict=False)]
-    return whole, np.vstack([pairs, np.array(added, dtype=np.int64).reshape(-1, 2)]), block
-
-
-def _outer_line(
-    places: Reals, pairs: Ids, nodes: Ids, depth: float, margin: float
-) -> tuple[Ids, Reals] | None:
-    """Return nodes in their order on a line, and the side on which there is room for a row.
-
-    None if they are not on a line, or there are other nodes on both sides, or struts to them.
-    """
-    if len(nodes) < 2:
-        return None
-    centre = places[nodes].mean(axis=0)
-    _, sizes, axes = np.linalg.svd(places[nodes] - centre)
-    if sizes[1] > _ROW_WIDTH * sizes[0]:
-        return None
-    along, across = axes
-    order = nodes[np.argsort(places[nodes] @ along)]
-    used, joined = np.unique(pairs), np.unique(pairs[np.isin(pairs, nodes).any(axis=1)])
-    away = places[used].mean(axis=0) - centre
-    outward = -across if away @ across > 0.0 else across
-    low, high = np.ptp(places[nodes] @ along) * np.array([-0.5, 0.5]) + margin * np.array([-1, 1])
-    for side in (outward, -outward):
-        others = places - centre
-        above = others @ side > _ROW_WIDTH * sizes[0]
-        within = (others @ along > low) & (others @ along < high)
-        near = np.isin(np.arange(len(places)), used) & (others @ side < depth + margin)
-        near[joined] = True
-        if not (above & within & near).any():
-            return order, side
-    return None
 
 
 def with_pointer(

@@ -132,8 +132,6 @@ def difference(start: State, end: State, out: Floats) -> None:
 @kernel
 def load_share(frame: Frame, fraction: float) -> float:
     """Return the part of forces and own weight that acts at a load."""
-    if frame.start == 0.0:
-        return fraction
     return max(0.0, (fraction - frame.start) / (1.0 - frame.start))
 
 

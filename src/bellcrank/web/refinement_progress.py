@@ -1,0 +1,120 @@
+"""Progress of refinements, and the design that the page draws."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bellcrank.mechanics import Response
+    from bellcrank.model import Design, Problem
+    from bellcrank.part import PartSpec
+    from bellcrank.refine.refinement import Progress as RefinementProgress
+    from bellcrank.search import SpecificationEvaluator
+    from bellcrank.workflows.refiners import GeometryCount
+
+MOVED_INTERVAL = 0.4
+"""Seconds between two evaluations of the displayed design."""
+
+
+class RefinementReporter:
+    """The latest and the best geometries of refinements.
+
+    Parameters
+    ----------
+    part
+        Part of the designs.
+    count
+        Count of their geometries.
+    only_met
+        Whether a geometry is shown only if it meets all items.
+
+    Attributes
+    ----------
+    design
+        The design that is shown; None if there is none yet.
+    """
+
+    def __init__(self, part: PartSpec, count: GeometryCount, *, only_met: bool = True) -> None:
+        self.design: Design | None = None
+        self._part, self._count, self._only_met = part, count, only_met
+        self._latest: dict[int, RefinementProgress] = {}
+        self._best: dict[int, RefinementProgress] = {}
+        self._sent: Design | None = None
+        self._sent_at = 0.0
+
+    def add(self, number: int, progress: RefinementProgress) -> None:
+        """Record a geometry of the refinement of a design."""
+        from bellcrank.refine.by_frames import MET
+
+        self._latest[number] = progress
+        self._count.add(number, progress.evaluations)
+        if progress.rows.violation > MET:
+            if not self._only_met and not self._best:
+                self.design = progress.design
+            return
+        best = self._best.get(number)
+        if best is None or progress.rows.objective > best.rows.objective:
+            self._best[number] = progress
+            self.design = self.designs()[0]
+
+    def designs(self) -> list[Design]:
+        """Return the best design of each refinement that meets all items, the best first."""
+        found = sorted(self._best.values(), key=lambda each: -each.rows.objective)
+        return [each.design for each in found if each.design is not None]
+
+    def summary(self) -> dict[str, Any] | None:
+        """Return the numbers of designs, geometries and sheets, and the best objective.
+
+        The objective is that of the latest geometries that meet all items. None before the first.
+        """
+        from bellcrank.refine.by_frames import MET
+
+        latest = self._latest.values()
+        if not latest:
+            return None
+        met = [each.rows.objective for each in latest if each.rows.violation <= MET]
+        return {
+            "designs": len(latest),
+            "geometries": self._count.done,
+            "sheets": sum(each.sheets for each in latest),
+            "most": self._count.most,
+            "objective": float(max(met)) if met else None,
+        }
+
+    def message(self, design: Design) -> dict[str, Any]:
+        """Return the response of a design for the page; empty if it was sent, or too soon."""
+        from bellcrank.model import problem_to_dict
+        from bellcrank.web.quick_calls import specification_of
+
+        if design is self._sent or time.monotonic() - self._sent_at < MOVED_INTERVAL:
+            return {}
+        evaluator = specification_of(design.problem)
+        assert evaluator is not None
+        shown = displayed(design.problem, self._part, evaluator.evaluate(design.mask), evaluator)
+        self._sent, self._sent_at = design, time.monotonic()
+        problem = problem_to_dict(design.problem)
+        return {"moved": {"mask": design.mask_hex, "problem": problem, **shown}}
+
+
+def displayed(
+    problem: Problem,
+    part: PartSpec,
+    response: Response,
+    specification: SpecificationEvaluator | None,
+) -> dict[str, Any]:
+    """Return motion, items and objectives of the design evaluated last for the page."""
+    from bellcrank.fem.results import finite
+    from bellcrank.web.items import item_states, objective_states
+    from bellcrank.web.quick_calls import flat
+
+    shown, items, objectives = response.is_admissible, None, []
+    if shown and specification is not None:
+        items = item_states(problem, part, specification.results())
+        objectives = objective_states(problem, part, specification)
+    return {
+        "efficiency": finite(response.efficiency),
+        "displacement": flat(response.displacement) if shown else None,
+        "items": items,
+        "objectives": objectives,
+    }
