@@ -155,7 +155,7 @@ def test_results_are_printed_even_where_no_record_can_be_kept(
     def full(*_words: object, **_options: object) -> None:
         raise StorageError("disk full")
 
-    monkeypatch.setattr(validation, "write_text", full)
+    monkeypatch.setattr(validation_record, "write_text", full)
     outcome = call("validate", copy, "--elements", 1, "--json")
     assert outcome.code == 0
     assert outcome.data["status"] == "converged"
