@@ -18,7 +18,7 @@ from bellcrank.errors import StorageError
 from bellcrank.fem import FemSettings
 from bellcrank.model import Design, find_problem, human_design, read_design, write_design
 from bellcrank.part import PartSpec
-from bellcrank.workflows import add_to_record, find_design, validate, validation
+from bellcrank.workflows import add_to_record, find_design, validate, validation_record
 
 from .helpers import PROBLEM, call, colours, files, refusal, write
 
