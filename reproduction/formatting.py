@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 
 def number(value: float | None, digits: int = 2) -> str:
@@ -43,3 +47,15 @@ def count(value: int, what: str) -> str:
 def span(low: float | None, high: float | None, digits: int = 2) -> str:
     """Format a range."""
     return f"{number(low, digits)} to {number(high, digits)}"
+
+
+def listed(names: Iterable[str]) -> str:
+    """Join names as in a sentence.
+
+    Examples
+    --------
+    >>> listed(["bellcrank", "pyMOTO"]), listed(["one", "two", "three"])
+    ('bellcrank and pyMOTO', 'one, two and three')
+    """
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reproduction.formatting import count, number
+from reproduction.formatting import count, listed, number
 from reproduction.pictures.outlines import Shape, draw_shapes
 from reproduction.registry import Claim
 
@@ -15,15 +15,13 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-METHODS = {"ours": "bellcrank", "rival": "pyMOTO"}
-
 
 def draw(figures: Mapping[str, Any], path: Path) -> None:
     """Draw all designs at rest and displaced."""
     shapes = []
     for name, task in figures["tasks"].items():
-        for side, method in METHODS.items():
-            row, ports = task[side], task["ports"]
+        ports = task["ports"]
+        for method, row in _by_method(task).items():
             score = number(row["efficiency"]) if row["efficiency"] else row["status"]
             shapes.append(
                 Shape(
@@ -53,49 +51,59 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
     )
 
 
+def _by_method(task: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Return the row of each method, bellcrank's first."""
+    return {"bellcrank": task["ours"], **task["rivals"]}
+
+
 def claims(figures: Mapping[str, Any]) -> list[Claim]:
-    """Compare both methods; the paper has no such values."""
-    found = []
-    for name, task in figures["tasks"].items():
-        ours, rival = task["ours"], task["rival"]
-        found.append(
-            Claim(
-                f"{name}: bellcrank and pyMOTO",
-                "",
-                f"efficiency {_score(ours)} and {_score(rival)}; largest stress "
-                f"{number(ours['von_mises_MPa'], 1)} and {number(rival.get('von_mises_MPa'), 1)} "
-                f"MPa; {_at_equal_stress(task)}; "
-                f"input force {number(ours['input_force_N'])} and "
-                f"{number(rival.get('input_force_N'))} N; design time on one core "
-                f"{ours['design_seconds']:.0f} and {rival['design_seconds']:.0f} s; "
-                f"area {number(ours['area_mm2'], 0)} and {number(rival.get('area_mm2'), 0)} mm²; "
-                f"smallest width {number(ours['narrowest_mm'], 1)} and "
-                f"{number(rival.get('narrowest_mm'), 1)} mm",
-                f"{_better_method(ours, rival)}; efficiency with "
-                f"{figures['triangles_mm'][1]:g} mm triangles "
-                f"{number(ours['efficiency_finer'])} and {number(rival['efficiency_finer'])}; "
-                f"bellcrank by goals: {_by_goals(ours)}; "
-                f"pyMOTO by springs at input and output: {_by_springs(rival)}",
-            )
-        )
-    lift = figures["lift"]
-    ours, rival = lift["ours"], lift["rival"]
-    found.append(
-        Claim(
-            f"{lift['title']} with a payload of {lift['payload_N']:g} N: bellcrank and pyMOTO",
-            "",
-            f"bellcrank: {_items(ours)}; pyMOTO: {_items(rival)}; "
-            f"area {number(ours['area_mm2'], 0)} and {number(rival['area_mm2'], 0)} mm²; "
-            f"smallest width {number(ours['narrowest_mm'], 1)} and "
-            f"{number(rival['narrowest_mm'], 1)} mm; "
-            f"design time {ours['design_seconds']:.0f} s on all cores and "
-            f"{rival['design_seconds']:.0f} s on one",
-            f"sums of violations and gains of bellcrank by seed: {_attempts(ours, 'seed')}; of "
-            "pyMOTO by limit on the off-axis motion, springs and filter: "
-            f"{_attempts(rival, 'off_axis', 'springs', 'radius')}",
-        )
+    """Compare the methods; the paper has no such values."""
+    return [_claim(name, task, figures) for name, task in figures["tasks"].items()] + [
+        _lift_claim(figures["lift"])
+    ]
+
+
+def _claim(name: str, task: Mapping[str, Any], figures: Mapping[str, Any]) -> Claim:
+    rows = _by_method(task)
+
+    def values(key: str, digits: int = 2) -> str:
+        return ", ".join(number(row.get(key), digits) for row in rows.values())
+
+    springs = "; ".join(
+        f"{package} by springs at input and output: {_by_springs(row)}"
+        for package, row in task["rivals"].items()
     )
-    return found
+    return Claim(
+        f"{name}: {listed(rows)}",
+        "",
+        f"efficiency {', '.join(map(_score, rows.values()))}; "
+        f"largest stress {values('von_mises_MPa', 1)} MPa; {_at_equal_stress(task)}; "
+        f"input force {values('input_force_N')} N; "
+        f"design time on one core {values('design_seconds', 0)} s; "
+        f"area {values('area_mm2', 0)} mm²; smallest width {values('narrowest_mm', 1)} mm",
+        f"{_best_methods(rows)}; efficiency with {figures['triangles_mm'][1]:g} mm triangles "
+        f"{values('efficiency_finer')}; bellcrank by goals: {_by_goals(task['ours'])}; {springs}",
+    )
+
+
+def _lift_claim(lift: Mapping[str, Any]) -> Claim:
+    rows = _by_method(lift)
+    others = "; ".join(
+        f"of {package} by limit on the off-axis motion, springs and filter: "
+        f"{_attempts(row, 'off_axis', 'springs', 'radius')}"
+        for package, row in lift["rivals"].items()
+    )
+    seconds = ", ".join(f"{row['design_seconds']:.0f} s" for row in lift["rivals"].values())
+    return Claim(
+        f"{lift['title']} with a payload of {lift['payload_N']:g} N: {listed(rows)}",
+        "",
+        "; ".join(f"{method}: {_items(row)}" for method, row in rows.items())
+        + f"; area {', '.join(number(row['area_mm2'], 0) for row in rows.values())} mm²; "
+        f"smallest width {', '.join(number(row['narrowest_mm'], 1) for row in rows.values())} mm; "
+        f"design time {lift['ours']['design_seconds']:.0f} s on all cores and {seconds} on one",
+        "sums of violations and gains of bellcrank by seed: "
+        f"{_attempts(lift['ours'], 'seed')}; {others}",
+    )
 
 
 def _at_equal_stress(task: Mapping[str, Any]) -> str:
@@ -161,9 +169,9 @@ def _by_springs(rival: Mapping[str, Any]) -> str:
     return "; ".join(texts)
 
 
-def _better_method(ours: Mapping[str, Any], rival: Mapping[str, Any]) -> str:
-    """Return the better method in each quantity as text."""
-    better: dict[str, list[str]] = {"bellcrank": [], "pyMOTO": []}
+def _best_methods(rows: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the best method in each quantity as text."""
+    best: dict[str, list[str]] = {method: [] for method in rows}
     for quantity, key, larger in (
         ("efficiency", "efficiency", True),
         ("stress", "von_mises_MPa", False),
@@ -171,22 +179,19 @@ def _better_method(ours: Mapping[str, Any], rival: Mapping[str, Any]) -> str:
         ("smallest width", "narrowest_mm", True),
         ("design time", "design_seconds", False),
     ):
-        mine, other = ours.get(key), rival.get(key)
-        if mine is None and other is None:
-            continue
-        if other is None or (mine is not None and (mine > other) == larger):
-            better["bellcrank"].append(quantity)
-        else:
-            better["pyMOTO"].append(quantity)
-    texts = [f"{side} is better in {', '.join(what)}" for side, what in better.items() if what]
+        known = {method: row[key] for method, row in rows.items() if row.get(key) is not None}
+        if known:
+            best[(max if larger else min)(known, key=lambda method: known[method])].append(quantity)
+    texts = [f"{method} is best in {', '.join(what)}" for method, what in best.items() if what]
     return "; ".join(texts)
 
 
 def runs(figures: Mapping[str, Any]) -> str:
-    """Return the effort of both methods as text."""
+    """Return the effort of all methods as text."""
     return (
         f"bellcrank: best of {count(len(figures['goals']), 'setting')}, "
         f"{count(figures['chains'], 'chain')} of {count(figures['steps'], 'proposal')} each; "
-        f"pyMOTO: best of {count(figures['tried'], 'setting')}, "
+        f"{listed(next(iter(figures['tasks'].values()))['rivals'])}: "
+        f"best of {count(figures['tried'], 'setting')}, "
         f"{count(figures['iterations'], 'iteration')} each"
     )

@@ -1,4 +1,4 @@
-"""A straight, loaded motion on a box, by both methods, scored on the whole specification."""
+"""A straight, loaded motion on a box, by each method, scored on the whole specification."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from reproduction.searching import design_with, geometry_of
 from reproduction.topology_designs import rival_designs
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from shapely import Polygon
 
@@ -38,8 +38,10 @@ UNSTABLE = 1e3
 """Violation of a design that is not stable, above all sums of violations."""
 
 
-def straight_lift(settings: Settings, store: ResultStore) -> dict[str, Any]:
-    """Design a lift by both methods at equal mass; return the items of both in the sheet.
+def straight_lift(
+    settings: Settings, store: ResultStore, packages: Sequence[str]
+) -> dict[str, Any]:
+    """Design a lift by each method at equal mass; return the items of each in the sheet.
 
     The input moves right, the output up. The items are those of straight entries of the library:
     gain, off-axis motion, rotation, sag, payload and strain. Contact is not scored.
@@ -48,14 +50,15 @@ def straight_lift(settings: Settings, store: ResultStore) -> dict[str, Any]:
     box = box_of("lift", columns, rows, settings.stroke, None, settings.width)
     ours, shape = _ours(box, settings, store)
     size = float(np.prod(box.high - box.low))
-    rival = _rival(box, shape.area / size, settings, store)
+    volume = shape.area / size
+    rivals = {each: _rival(each, box, volume, settings, store) for each in packages}
     return {
         "title": title,
         "payload_N": PAYLOAD,
         "box_mm": (box.high - box.low).tolist(),
-        "volume": shape.area / size,
+        "volume": volume,
         "ours": ours,
-        "rival": rival,
+        "rivals": rivals,
     }
 
 
@@ -90,19 +93,21 @@ def _designed(box: Box, settings: Settings, seed: int) -> dict[str, Any]:
     return {**geometry_of(report.selection.design), "design_seconds": seconds}
 
 
-def _rival(box: Box, volume: float, settings: Settings, store: ResultStore) -> dict[str, Any]:
-    """Return the score of the best topology-optimised design of a volume.
+def _rival(
+    package: str, box: Box, volume: float, settings: Settings, store: ResultStore
+) -> dict[str, Any]:
+    """Return the score of the best design of a volume by a package of topology optimisation.
 
-    With and without a limit on the off-axis motion.
+    pyMOTO designs with and without a limit on the off-axis motion; topoptlab has no such limit.
     """
     score = partial(scored, box, triangle=settings.triangle)
-    tried = [
-        {"off_axis": off_axis, **row}
-        for off_axis in (OFF_AXIS, None)
-        for row, _ in rival_designs(
-            box, f"lift-{off_axis}", volume, settings, store, score, off_axis
-        )
-    ]
+    limits = (OFF_AXIS, None) if package == "pyMOTO" else (None,)
+    tried = []
+    for off_axis in limits:
+        more = {"off_axis": off_axis} if off_axis else {}
+        name = f"lift-{off_axis}"
+        found = rival_designs(package, box, name, volume, settings, store, score, **more)
+        tried += [{"off_axis": off_axis, **row} for row, _ in found]
     best = min(tried, key=_rank)
     return {**best, "tried": [_short(row, "off_axis", "springs", "radius") for row in tried]}
 

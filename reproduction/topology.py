@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
+from reproduction.box_elements import grid_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,8 +27,6 @@ INSTALL = "pip install 'bellcrank[rivals]'"
 LEAST = 1e-6
 """Relative stiffness of void elements."""
 POISSON = 0.3
-PAD = 1.7
-"""Radius of the solid regions around ports and supports, mm; slightly larger than in bellcrank."""
 
 
 def pymoto() -> Any:
@@ -88,23 +87,30 @@ def optimise(
         output_over_input, and across_over_output, the motion of the output across its direction
         over that along it.
     """
-    module = pymoto()
-    size = box.high - box.low
-    across, up = (max(round(elements * float(side) / size.max()), 2) for side in size)
-    domain = module.VoxelDomain(across, up)
-    step = size / np.array([across, up])
-    solid, empty = _passive(box, domain, step, (across, up))
-    load, output, held = _ports(box, domain, step)
+    grid = grid_of(box, elements)
+    across, up = grid.counts
+    domain = pymoto().VoxelDomain(across, up)
     began = time.thread_time()
     smooth, motion = largest_motion(
-        domain, load, output, held, solid, empty, volume, springs, radius, iterations, off_axis
+        domain,
+        grid.load,
+        grid.output,
+        grid.held,
+        grid.solid,
+        grid.empty,
+        volume,
+        springs,
+        radius,
+        iterations,
+        off_axis,
     )
+    output = grid.output
     return {
         "density": smooth.reshape(up, across).round(4).tolist(),
         "elements": [across, up],
         "seconds": round(time.thread_time() - began, 2),
         "springs": list(springs),
-        "output_over_input": float(output @ motion) / float(load @ motion),
+        "output_over_input": float(output @ motion) / float(grid.load @ motion),
         "across_over_output": abs(float(_across(output) @ motion) / float(output @ motion)),
     }
 
@@ -176,50 +182,6 @@ def largest_motion(
         with contextlib.redirect_stdout(io.StringIO()):
             module.minimize_mma(density, responses, network, maxit=iterations, verbosity=0)
     return np.asarray(smooth.state), np.asarray(moved.state)
-
-
-def _passive(
-    box: Box, domain: Any, step: NDArray[np.float64], shape: tuple[int, int]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the numbers of the fixed solid and of the fixed void elements."""
-    columns, rows = np.meshgrid(np.arange(shape[0]), np.arange(shape[1]))
-    number = domain.get_elemnumber(columns.ravel(), rows.ravel())
-    centres = box.low + step * (np.column_stack([columns.ravel(), rows.ravel()]) + 0.5)
-    problem = box.problem
-    ports = np.concatenate([problem.input.nodes, problem.output.nodes, problem.supports.fixed])
-    away = np.hypot(*(centres[:, None] - box.positions[ports][None]).transpose(2, 0, 1)).min(axis=1)
-    solid = away < PAD
-    empty = np.zeros(len(number), dtype=bool)
-    if box.void is not None:
-        empty = ((centres > box.void[0]) & (centres < box.void[1])).all(axis=1) & ~solid
-    return number[solid], number[empty]
-
-
-def _ports(
-    box: Box, domain: Any, step: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.int64]]:
-    """Return the unit load at the input, the mean output, and the fixed degrees of freedom."""
-    problem = box.problem
-    corners = np.arange(domain.nnodes)
-    points = box.low + step * np.column_stack(
-        [corners % (domain.nelx + 1), corners // (domain.nelx + 1)]
-    )
-
-    def nearest(node: int) -> int:
-        return int(np.argmin(np.hypot(*(points - box.positions[node]).T)))
-
-    load, output = np.zeros(2 * domain.nnodes), np.zeros(2 * domain.nnodes)
-    for vector, region in ((load, problem.input), (output, problem.output)):
-        for node, direction in zip(region.nodes.tolist(), region.direction, strict=True):
-            at = 2 * nearest(node)
-            vector[at : at + 2] += direction / len(region.nodes)
-    held = [
-        2 * corner + axis
-        for node in problem.supports.fixed
-        for corner in np.flatnonzero(np.hypot(*(points - box.positions[node]).T) < 0.8 * PAD)
-        for axis in (0, 1)
-    ]
-    return load, output, np.array(sorted(set(held)), dtype=np.int64)
 
 
 def _across(output: NDArray[np.float64]) -> NDArray[np.float64]:

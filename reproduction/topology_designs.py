@@ -1,4 +1,4 @@
-"""Topology-optimised designs of a box with several settings."""
+"""Topology-optimised designs of a box with several settings, by each package."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from reproduction import topology, topoptlab_peer
 from reproduction.outline_analysis import contour_of
-from reproduction.topology import optimise
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,44 +22,71 @@ if TYPE_CHECKING:
 
     Row = dict[str, Any]
 
+PACKAGES: dict[str, Callable[..., Row]] = {
+    "pyMOTO": topology.optimise,
+    "topoptlab": topoptlab_peer.optimise,
+}
+"""Function that returns the densities of a box, by package."""
+
+
+def packages() -> tuple[str, ...]:
+    """Return the packages that take part: topoptlab only if its interpreter is given.
+
+    Raises
+    ------
+    InvalidSettings
+        If pyMOTO is not installed, or the given interpreter has no topoptlab.
+    """
+    topology.pymoto()
+    return ("pyMOTO", "topoptlab") if topoptlab_peer.interpreter() else ("pyMOTO",)
+
 
 def rival_designs(
+    package: str,
     box: Box,
     name: str,
     volume: float,
     settings: Settings,
     store: ResultStore,
     score: Callable[[Polygon | None], Row],
-    off_axis: float | None = None,
+    **more: Any,
 ) -> list[tuple[Row, Polygon | None]]:
     """Return topology-optimised designs of a volume: their settings and scores, and outlines.
 
     Parameters
     ----------
+    package
+        One of `PACKAGES`.
     name
         Prefix of the stored results.
     score
         Function of an outline; None if input, output and support are not connected.
-    off_axis
-        As in `optimise`.
+    **more
+        Further arguments of the function of the package.
     """
     area = volume * float(np.prod(box.high - box.low))
     attempts = tuple(product(settings.radii, settings.springs))
     tried: list[tuple[Row, Polygon | None]] = []
     for radius, springs in attempts:
-        key = f"{springs[0]:g}-{springs[1]:g}-{radius:g}"
+        key = f"{package}-{springs[0]:g}-{springs[1]:g}-{radius:g}"
         work = partial(
-            optimise, box, settings.elements, volume, springs, radius, settings.iterations, off_axis
+            PACKAGES[package],
+            box,
+            settings.elements,
+            volume,
+            springs,
+            radius,
+            settings.iterations,
+            **more,
         )
-        made = store.compute(f"{name}-rival-{key}", work)
+        made = store.compute(f"{name}-{key}", work)
         shape = contour_of(box, np.array(made["density"]), area)
         row = {
             "springs": list(springs),
             "radius": radius,
-            "model": made["output_over_input"],
             "design_seconds": made["seconds"],
-            **store.compute(f"{name}-rival-judged-{key}", partial(score, shape)),
+            **store.compute(f"{name}-judged-{key}", partial(score, shape)),
         }
         tried.append((row, shape))
-        store.progress(f"{name}-rival", len(tried), len(attempts))
+        store.progress(f"{name}-{package}", len(tried), len(attempts))
     return tried

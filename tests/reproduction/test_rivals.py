@@ -1,16 +1,23 @@
 from __future__ import annotations
 
+import json
 import sys
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.machines.library.tasks import straight_motion
+from reproduction import topoptlab_peer
 from reproduction.boxes import TASKS, box_of
 from reproduction.outline_analysis import analyse_outline, contour_of, drawing, polygon_of
 from reproduction.straight_lift import PAYLOAD, scored
 from reproduction.topology import optimise, pymoto
+from reproduction.topology_designs import packages
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @pytest.mark.parametrize("name", TASKS)
@@ -52,6 +59,71 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pymoto", None)
     with pytest.raises(InvalidSettings, match=r"pip install 'bellcrank\[rivals\]'"):
         pymoto()
+
+
+STAND_IN = """
+import json, sys
+job = json.load(open(sys.argv[1]))
+across, down = job["elements"]
+density = [0.001 * (k + 1) for k in range(across * down)]
+json.dump({"density": density, "seconds": 1.0, "job": job}, open(sys.argv[2], "w"))
+json.dump(job, open("KEPT", "w"))
+"""
+"""A program in place of topoptlab: densities that increase with the number of the element."""
+
+
+def test_a_separate_program_gets_and_gives_elements_in_its_own_numbering(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    kept = tmp_path / "job.json"
+    program = tmp_path / "program.py"
+    program.write_text(STAND_IN.replace("KEPT", str(kept)))
+    monkeypatch.setattr(topoptlab_peer, "PROGRAM", program)
+    monkeypatch.setattr(topoptlab_peer, "interpreter", lambda: sys.executable)
+    box = box_of("inverter", 6, 7, 0.2, 0.01)
+    made = topoptlab_peer.optimise(box, 40, 0.4, (0.1, 0.01), 2.0, 5)
+    density, (across, up) = np.array(made["density"]), made["elements"]
+    assert density.shape == (up, across)
+    # Columns from the left, each from the top; here rows are from the bottom.
+    assert density[-1, 0] == 0.001
+    assert density[-2, 0] == 0.002
+    assert density[-1, 1] == pytest.approx(0.001 * (up + 1))
+    job = json.loads(kept.read_text())
+    load, output = np.array(job["load"]), np.array(job["output"])
+    (push,), (pull,) = np.flatnonzero(load), np.flatnonzero(output)
+    # The input is in the middle of the left side, the output in that of the right side.
+    assert push % 2 == pull % 2 == 0
+    for place, side in ((push, 0), (pull, across)):
+        column, row = divmod(place // 2, up + 1)
+        assert column == pytest.approx(side, abs=1)
+        assert row == pytest.approx(0.5 * up, abs=1)
+    assert load[push] == 1.0
+    assert output[pull] == -1.0
+    assert job["springs"] == [[push, pull], [0.1, 0.01]]
+    rows = {place // 2 % (up + 1) for place in job["held"]}
+    assert {min(rows), max(rows)} <= {0, 1, up - 1, up}
+
+
+def test_an_interpreter_without_the_package_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(topoptlab_peer.INTERPRETER, raising=False)
+    assert packages() == ("pyMOTO",)
+    monkeypatch.setenv(topoptlab_peer.INTERPRETER, "/no/such/python")
+    with pytest.raises(InvalidSettings, match="No such file"):
+        packages()
+
+
+@pytest.mark.slow
+def test_topoptlab_finds_an_inverter() -> None:
+    if topoptlab_peer.interpreter() is None:
+        pytest.skip("no interpreter with topoptlab is given")
+    box = box_of("inverter", 4, 7, 0.2, 0.01)
+    made = topoptlab_peer.optimise(box, 26, 0.4, (0.1, 0.01), 1.5, 40)
+    density = np.array(made["density"])
+    assert density.mean() == pytest.approx(0.4, abs=0.02)
+    shape = contour_of(box, density, 0.4 * float(np.prod(box.high - box.low)))
+    assert shape is not None
+    part = box.spec.of(box.problem.full_design())
+    assert analyse_outline(box, part, shape, 2.0, "neo-hookean")["efficiency"] > 0.3
 
 
 @pytest.mark.slow
