@@ -230,6 +230,22 @@ def test_frames_say_how_the_part_moves(client: TestClient, crane: dict[str, Any]
     )
 
 
+def test_a_check_is_found_again_without_computing_it(
+    client: TestClient, crane: dict[str, Any]
+) -> None:
+    part = {"width": 1.7}
+    body = {"problem": crane["problem"], "mask": crane["mask"], "part": part}
+    before = client.post("/api/computations", json=body).json()
+    assert before["validation"]["frame"] is None
+    assert before["tolerance"] is None
+    found = client.post("/api/validation", json={**body, "level": "frame"}).json()
+    after = client.post("/api/computations", json=body).json()
+    assert after["validation"]["frame"] == {"result": found}
+    assert after["validation"]["plane"] is None
+    running = client.post("/api/computations", json={**body, "results": False}).json()
+    assert running["validation"]["frame"] is None
+
+
 def test_a_design_by_hand_is_kept_and_found_in_the_gallery(
     client: TestClient, crane: dict[str, Any]
 ) -> None:

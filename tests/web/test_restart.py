@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import uuid
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,7 +32,12 @@ MARK = "BELLCRANK_TEST_MARK"
 
 @contextmanager
 def serving(
-    folder: Path, end: int = signal.SIGTERM, *, mark: str = "", warm: bool = True
+    folder: Path,
+    end: int = signal.SIGTERM,
+    *,
+    mark: str = "",
+    warm: bool = True,
+    messages: list[str] | None = None,
 ) -> Iterator[Any]:
     """Run `bellcrank serve` and yield who asks it.
 
@@ -41,6 +47,8 @@ def serving(
         In the environment of the server and of all that it starts.
     warm
         Wait until it can compute.
+    messages
+        List to which its later messages are added when it has ended.
     """
     command = [sys.executable, "-m", "bellcrank", "serve", "--port", "0", "--folder", str(folder)]
     environment = {**os.environ, MARK: mark}
@@ -59,6 +67,8 @@ def serving(
         finally:
             os.kill(process.pid, end)
             process.wait(60)
+            if messages is not None:
+                messages.append(process.stderr.read())
 
 
 def _answers(client: Any) -> bool:
@@ -141,3 +151,29 @@ def test_no_process_outlives_a_server_that_was_still_starting_them(
     with serving(tmp_path, end, mark=mark, warm=False):
         wait_for(lambda: len(marked(mark)) > 2)
     wait_for(lambda: not marked(mark), seconds=30)
+
+
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "told"])
+def test_a_computation_ends_with_its_server_without_a_traceback(tmp_path: Path, end: int) -> None:
+    messages: list[str] = []
+    with ThreadPoolExecutor(1) as pool:
+        with serving(tmp_path, end, messages=messages) as client:
+            crane = client.get("/api/gallery/builtin/human-crane").json()
+            body = {"problem": crane["problem"], "mask": crane["mask"], "part": {}}
+            answer = pool.submit(
+                httpx.post, f"{client.base_url}api/tolerance", json=body, timeout=60
+            )
+            asked = {**body, "results": False}
+            wait_for(lambda: client.post("/api/computations", json=asked).json()["tolerance"])
+        assert answer.result(60).status_code == 503
+    assert "Traceback" not in messages[0]
+
+
+def test_a_check_is_found_again_after_a_restart(tmp_path: Path) -> None:
+    with serving(tmp_path) as client:
+        crane = client.get("/api/gallery/builtin/human-crane").json()
+        body = {"problem": crane["problem"], "mask": crane["mask"], "part": {"width": 1.6}}
+        found = client.post("/api/validation", json={**body, "level": "frame"}).json()
+    with serving(tmp_path, warm=False) as client:
+        known = client.post("/api/computations", json=body).json()
+        assert known["validation"]["frame"] == {"result": found}

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bellcrank.web.results import Results
+from bellcrank.web.results import Results, StoredResults
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def test_a_result_is_computed_once_and_a_failure_again() -> None:
@@ -62,3 +65,79 @@ def test_the_result_that_was_not_used_for_the_longest_time_is_dropped() -> None:
 
     asyncio.run(run())
     assert calls == ["one", "two", "three", "two"]
+
+
+def test_a_stored_result_outlasts_the_server(tmp_path: Path) -> None:
+    calls: list[str] = []
+
+    async def compute(_share: Path) -> dict[str, Any]:
+        calls.append("computed")
+        return {"stress": 0.5}
+
+    async def run() -> None:
+        first = StoredResults(tmp_path / "results")
+        assert first.state("crane") is None
+        assert await first.get("crane", compute) == {"stress": 0.5}
+        second = StoredResults(tmp_path / "results")
+        assert second.state("crane") == {"result": {"stress": 0.5}}
+        assert second.state("crane", running=True) is None
+        assert await second.get("crane", compute) == {"stress": 0.5}
+        assert len(calls) == 1
+
+    asyncio.run(run())
+
+
+def test_a_running_computation_has_the_share_that_it_writes(tmp_path: Path) -> None:
+    async def run() -> None:
+        results, go_on = StoredResults(tmp_path / "results"), asyncio.Event()
+
+        async def compute(share: Path) -> dict[str, Any]:
+            share.write_text("0.250")
+            await go_on.wait()
+            return {"stress": 0.5}
+
+        task = asyncio.create_task(results.get("crane", compute))
+        for _ in range(3):
+            await asyncio.sleep(0)
+        assert results.state("crane") == {"share": 0.25}
+        go_on.set()
+        await task
+        assert results.state("crane") == {"result": {"stress": 0.5}}
+        assert not list((tmp_path / "results").glob("*.share"))
+
+    asyncio.run(run())
+
+
+def test_damaged_and_old_files_are_not_used(tmp_path: Path) -> None:
+    calls: list[str] = []
+
+    async def compute(_share: Path) -> dict[str, Any]:
+        calls.append("computed")
+        return {"number": len(calls)}
+
+    async def run() -> None:
+        results = StoredResults(tmp_path, most=2)
+        await results.get("one", compute)
+        (file,) = tmp_path.glob("*.json")
+        file.write_text("{")
+        again = StoredResults(tmp_path, most=2)
+        assert again.state("one") is None
+        assert await again.get("one", compute) == {"number": 2}
+        for name in ("two", "three"):
+            await again.get(name, compute)
+        assert len(list(tmp_path.glob("*.json"))) == 2
+
+    asyncio.run(run())
+
+
+def test_a_failure_is_not_stored(tmp_path: Path) -> None:
+    async def fail(_share: Path) -> dict[str, Any]:
+        raise ValueError("no mesh")
+
+    async def run() -> None:
+        results = StoredResults(tmp_path)
+        with pytest.raises(ValueError, match="no mesh"):
+            await results.get("crane", fail)
+        assert results.state("crane") is None
+
+    asyncio.run(run())

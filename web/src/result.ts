@@ -36,12 +36,17 @@ interface Print { minutes: number | null; layers: number; layer_mm: number; mass
 const FLAT_BODY = { level: "plane", title: "2D solid", words: "the 2D solid, the printed outline" };
 const SPACE_BODY = { level: "solid", title: "3D solid", words: "the 3D solid, the printed body" };
 
+/** Time between two questions after what is computed, milliseconds. */
+const SHARE_PERIOD = 2000;
+
 /** Effort of a search that begins with a design. */
 const CONTINUED = { steps: 8000, chains: 2 };
 
-/** What was computed of designs while the page is open. */
-interface Known { fems: Record<string, Fem | "running" | string>; tolerance: ToleranceFound | "running" | string | null; print: Print | "running" | string | null }
-const computed = new Map<string, Known>();
+/** What was computed of a part. */
+interface Known { fems: Record<string, Fem | "running" | string>; tolerance: ToleranceFound | "running" | string | null; print: Print | "running" | string | null; shares: Record<string, number | null> }
+/** What the server knows of a slow computation: its result, or the share that is done. */
+type Computation<Found> = { result: Found } | { share: number | null } | null;
+interface Computations { validation: Record<string, Computation<Fem>>; tolerance: Computation<ToleranceFound>; print: Computation<Print> }
 
 export class Result {
   readonly player: Player;
@@ -64,6 +69,9 @@ export class Result {
   private remarks: Remarks | null = null;
   private hasSlicer = false;
   private writing = "";
+  private readonly knownOf = new Map<string, Known>();
+  private following = false;
+  private closed = false;
   private grips = { plate: false, screws: 0, pad: false };
 
   constructor(private readonly subject: Subject) {
@@ -84,10 +92,10 @@ export class Result {
     void this.describe();
     void this.loadReport();
     void get<{ slicer: boolean }>("/about").then(({ slicer }) => { this.hasSlicer = slicer; this.showPart(); }, () => undefined);
-    this.resume();
-    if (this.isPart && !this.known.fems["frame"]) void this.validate("frame", false);
-    void fetchRegistries().then((found) => {
+    const resumed = this.resume().then(() => { if (this.isPart && !this.known.fems["frame"]) void this.validate("frame", false); });
+    void fetchRegistries().then(async (found) => {
       this.registries = found;
+      await resumed;
       const { level } = this.body;
       const isQuick = this.body === FLAT_BODY && found.levels.some(({ name, missing }) => name === level && !missing);
       if (this.subject.problem.specification && isQuick && !this.known.fems[level]) void this.validate(level, false);
@@ -99,23 +107,58 @@ export class Result {
 
   /** What is known of the part with its present size and material. */
   private get known(): Known {
-    const { problem: { positions, widths }, mask } = this.subject;
-    const key = JSON.stringify([mask, positions, widths, this.part]);
-    let found = computed.get(key);
-    if (!found) { found = { fems: {}, tolerance: null, print: null }; computed.set(key, found); }
+    const key = JSON.stringify(this.part);
+    let found = this.knownOf.get(key);
+    if (!found) { found = { fems: {}, tolerance: null, print: null, shares: {} }; this.knownOf.set(key, found); }
     return found;
   }
 
-  /** Show again what was computed before, and follow what is still computed: the server does not begin anew. */
-  private resume(): void {
-    const { fems, tolerance, print } = this.known;
-    for (const [level, found] of Object.entries(fems)) {
-      if (found === "running") void this.validate(level, false);
-      else if (typeof found === "string") delete fems[level]; // a failure is tried again
+  /** Show what the server has computed before, and follow what it still computes. */
+  private async resume(): Promise<void> {
+    const { known } = this;
+    const stored = await this.askComputations(true);
+    for (const [level, found] of Object.entries(stored?.validation ?? {})) {
+      if (found && "result" in found) known.fems[level] = found.result;
+      else if (found) void this.validate(level, false);
     }
-    if (tolerance === "running") void this.computeTolerance();
-    else if (tolerance && typeof tolerance !== "string") this.player.showLosses(tolerance.losses, false);
-    if (print === "running") void this.slice();
+    if (stored?.tolerance && "result" in stored.tolerance) {
+      known.tolerance = stored.tolerance.result;
+      this.player.showLosses(known.tolerance.losses, false);
+    } else if (stored?.tolerance) void this.computeTolerance();
+    if (stored?.print && "result" in stored.print) known.print = stored.print.result;
+    else if (stored?.print) void this.slice();
+    this.showTable();
+    this.showTolerance();
+    this.showPart();
+  }
+
+  private async askComputations(results: boolean): Promise<Computations | null> {
+    const { problem, mask } = this.subject;
+    return post<Computations>("/computations", { problem, mask, part: this.part, results }).catch(() => null);
+  }
+
+  /** Show the shares of what is computed, until all is done. */
+  private async follow(): Promise<void> {
+    if (this.following) return;
+    this.following = true;
+    const { known } = this;
+    const isRunning = (): boolean => known.tolerance === "running" || Object.values(known.fems).includes("running");
+    while (isRunning() && !this.closed && known === this.known) {
+      await new Promise((resolve) => { setTimeout(resolve, SHARE_PERIOD); });
+      if (!isRunning() || this.closed) break;
+      const found = await this.askComputations(false);
+      const shareOf = (each: Computation<unknown> | undefined): number | null => each && "share" in each ? each.share : null;
+      known.shares = { tolerance: shareOf(found?.tolerance), ...Object.fromEntries(Object.entries(found?.validation ?? {}).map(([level, each]) => [level, shareOf(each)])) };
+      this.showTable();
+      this.showTolerance();
+    }
+    this.following = false;
+  }
+
+  /** How much of a computation is done, after "computing". */
+  private shareText(name: string): string {
+    const share = this.known.shares[name];
+    return share == null ? "computing …" : `computing, ${Math.round(100 * share)} % …`;
   }
 
   /** The model of the printed body. */
@@ -127,7 +170,7 @@ export class Result {
   /** Whether the design was selected by frame analysis of its part. */
   private get isPart(): boolean { return Boolean(this.subject.part ?? this.subject.provenance["part"]); }
 
-  close(): void { this.player.close(); }
+  close(): void { this.closed = true; this.player.close(); }
 
   private async loadReport(): Promise<void> {
     const asked = ++this.reports;
@@ -175,7 +218,7 @@ export class Result {
     const unstable = !first || first.efficiency === undefined || (report.specified && !report.items.frames);
     const isMet = last !== null && columns.every(({ items }) => items.every(({ met }) => met)) && !unstable;
     this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? (solid?.items ? "met" : "met pending") : "missed"}`;
-    const pending = found === "running" ? `; ${words}, is being computed …` : !solid ? `; not checked in ${words}` : !solid.items ? `; not stable in ${words}` : "";
+    const pending = found === "running" ? `; ${words}, is ${this.shareText(level).replace("computing", "being computed")}` : !solid ? `; not checked in ${words}` : !solid.items ? `; not stable in ${words}` : "";
     const by = solid?.items ? ` by frames and in ${words}` : " by frames";
     clear(this.verdict, unstable ? "The part snaps or collapses before the full stroke, by frames with 8 elements in each strut."
       : last ? `${verdictOf(last)}${isMet || !solid?.items ? by : ` in ${words}`}${pending}.` : "No specification: the task says nothing about straightness, rotation or load.");
@@ -211,7 +254,7 @@ export class Result {
     if (known === undefined) {
       return h("tr", {}, heading, h("td", { colspan: 2 }, button("Check with finite elements", () => void this.validate(name), "quiet small", { "aria-label": `Check with finite elements: ${title}` }), h("span", { class: "more" }, ` ${duration}`)));
     }
-    if (known === "running") return h("tr", {}, heading, h("td", { colspan: 2, class: "more" }, h("span", { class: "working" }), "computing …"));
+    if (known === "running") return h("tr", {}, heading, h("td", { colspan: 2, class: "more" }, h("span", { class: "working" }), this.shareText(name)));
     if (typeof known === "string") return h("tr", {}, heading, h("td", { colspan: 2, class: "fault" }, known));
     const stress = known.von_mises_MPa === null ? "" : `${figure(known.von_mises_MPa, 2)} MPa, ${figure(100 * (known.principal_strain ?? 0), 0)} % strain`;
     // Warnings of the frame are shown below the headline.
@@ -225,6 +268,7 @@ export class Result {
     const { known } = this;
     known.fems[level] = "running";
     this.showTable();
+    void this.follow();
     try {
       const { problem, mask } = this.subject;
       const found = await post<Fem>("/validation", { problem, mask, part: this.part, level });
@@ -240,6 +284,7 @@ export class Result {
     const { known } = this;
     known.tolerance = "running";
     this.showTolerance();
+    void this.follow();
     const { problem, mask } = this.subject;
     try {
       known.tolerance = await post<ToleranceFound>("/tolerance", { problem, mask, part: this.part });
@@ -258,7 +303,7 @@ export class Result {
         button("Compute the tolerance", () => void this.computeTolerance(), "", { "data-key": "tolerance" }), h("span", { class: "more" }, " ten seconds to a minute"));
       return;
     }
-    if (tolerance === "running") { clear(this.toleranceBox, h("p", { class: "more" }, h("span", { class: "working" }), "computing …")); return; }
+    if (tolerance === "running") { clear(this.toleranceBox, h("p", { class: "more" }, h("span", { class: "working" }), this.shareText("tolerance"))); return; }
     if (typeof tolerance === "string") { clear(this.toleranceBox, h("p", { class: "fault", role: "alert" }, tolerance)); return; }
     const [head, ...rows] = tolerance.rows;
     const shown = head!.map((name, k) => ({ name, k })).filter(({ name }) => name !== "wanted");
@@ -282,6 +327,7 @@ export class Result {
       this.showTolerance();
       void this.describe();
       void this.loadReport();
+      void this.resume();
     };
     const size = (key: "width" | "thickness" | "scale", label: string): HTMLElement =>
       field(label, number(this.part[key], { min: 0.1, step: "any" }, (value) => change({ [key]: value })), "mm");

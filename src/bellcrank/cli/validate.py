@@ -45,16 +45,22 @@ if TYPE_CHECKING:
 
 
 class StrokeProgress(Live):
-    """Progress of a validation: current analysis and fraction of the stroke reached."""
+    """Progress of a validation: current analysis and fraction of it that is done.
+
+    Parameters
+    ----------
+    names
+        Names of the analyses; the last one is that of the items of the specification.
+    """
 
     def __init__(self, names: Sequence[str]) -> None:
         super().__init__("validating", 100 * len(names))
         self._names = names
 
     def __call__(self, index: int, load: float) -> None:
-        """Show the fraction of the stroke that an analysis has reached."""
+        """Show the fraction of an analysis that is done."""
         name = self._names[index]
-        line = f"{name}: {load:.0%} of the stroke"
+        line = f"{name}: {load:.0%}"
         self._show(int(100 * (index + load)), 100 * len(self._names), name, line)
 
 
@@ -143,6 +149,7 @@ def validate(
     ]
     validations = []
     names = [f"{name} {_model(name, settings)}" for name, settings in plan]
+    names.append("items of the specification")
     for one, save in zip(strokes, savers, strict=False):
         with StrokeProgress(names) as progress:
             validations.append(validate(one, spec, plan, progress, save))

@@ -52,6 +52,8 @@ STATES = 16
 """Number of states along the stroke at which items are evaluated; between the computed ones,
 channels are interpolated by a cubic spline in each part of the stroke without a kink."""
 LAW = "neo-hookean"
+OWN_PATHS = ("loaded_motion", "carried_motion", "blocked_force")
+"""Channels that need a path of their own."""
 DIGITS = 10
 """Number of digits of the channels. NGSolve adds in an order that differs from run to run; later
 digits would make refinements with equal seeds differ."""
@@ -113,7 +115,7 @@ def sheet_records(
     size
         Largest edge of the triangles, mm; that of `fineness` by default.
     report
-        Called with the name of the load case and the fraction of the stroke reached.
+        Called with the name of the load case and the fraction of its paths that is computed.
     fineness
         How fine the mesh in the plane is. With `COARSE`, a path that needs steps below a
         hundredth of the stroke, or more than a hundred factorisations, counts as unstable.
@@ -172,6 +174,7 @@ class _Sheet:
         self.objectives = [each for each in wanted.maximise if each.case == name]
         self.forces = forces_of(self.items)
         self.weight = wanted.weight
+        self.report: Callable[[float], None] = lambda _load: None
         self.force_unit = part.stiffness_unit * part.scale
 
     def record(
@@ -181,19 +184,28 @@ class _Sheet:
 
         None without a stable path.
         """
-        main = self._path(lambda state: report(state.load))
+        items: list[Item | ObjectiveTerm] = [*self.items, *self.objectives]
+        wanted = [(each.quantity, each.output) for each in items]
+        wanted += [(quantity, output) for output in self.case.outputs for quantity in quantities]
+        needed = dict.fromkeys(channel for each in wanted for channel in channels_of(*each))
+        paths = 1 + sum(channel.name in OWN_PATHS for channel in needed)
+
+        def share(done: int, load: float) -> None:
+            report((done + load) / paths)
+
+        self.report = partial(share, 0)
+        main = self._path()
         if main is None:
             return None
         ends = [end for item in self.items for end in (item.start, item.stop) if end > 0.0]
         kinks = self.case.input.kinks
         fractions = np.unique(np.concatenate([np.arange(1, STATES + 1) / STATES, ends, kinks]))
-        items: list[Item | ObjectiveTerm] = [*self.items, *self.objectives]
-        wanted = [(each.quantity, each.output) for each in items]
-        wanted += [(quantity, output) for output in self.case.outputs for quantity in quantities]
-        needed = [channel for each in wanted for channel in channels_of(*each)]
-        channels = {
-            channel: self._channel(channel, main, fractions) for channel in dict.fromkeys(needed)
-        }
+        channels, done = {}, 1
+        for channel in needed:
+            self.report = partial(share, done)
+            channels[channel] = self._channel(channel, main, fractions)
+            done += channel.name in OWN_PATHS
+        self.report = lambda _load: None
         channels = {channel: _rounded(values) for channel, values in channels.items()}
         return StrokeRecord(fractions, channels, self._given(main), self.forces, kinks)
 
@@ -201,20 +213,17 @@ class _Sheet:
         return replace(self.part, design=replace(self.part.design, problem=problem))
 
     def _follow(
-        self,
-        problem: Problem,
-        report: Callable[[PathState], None] = lambda _state: None,
-        dead_load: NodeForce | None = None,
+        self, problem: Problem, dead_load: NodeForce | None = None
     ) -> tuple[ContinuumEquations, EquilibriumPath] | None:
         """Follow a load case to the full stroke; None if stability is lost before."""
         system = continuum_system(self._part(problem), self.mesh, LAW, dead_load=dead_load)
         equations = ContinuumEquations(system)
-        path = follow_path(equations, self.control, report)
+        path = follow_path(equations, self.control, lambda state: self.report(state.load))
         return (equations, path) if path.status is PathStatus.CONVERGED else None
 
-    def _path(self, report: Callable[[PathState], None]) -> SheetPath | None:
+    def _path(self) -> SheetPath | None:
         """Follow the load case, with all figures of its states; None if stability is lost."""
-        found = self._follow(self.case, report)
+        found = self._follow(self.case)
         if found is None:
             return None
         equations, path = found
@@ -228,7 +237,7 @@ class _Sheet:
 
     def _last_motion(self, problem: Problem, dead_load: NodeForce | None = None) -> Values | None:
         """Return (N, d) the displacements at full stroke, lattice units; None without stability."""
-        found = self._follow(problem, dead_load=dead_load)
+        found = self._follow(problem, dead_load)
         if found is None:
             return None
         equations, path = found

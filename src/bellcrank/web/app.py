@@ -24,9 +24,10 @@ from bellcrank.web.errors import plain_error
 from bellcrank.web.gallery import BundledDesigns, Gallery, RunDesigns, SavedDesigns
 from bellcrank.web.jobs import Jobs
 from bellcrank.web.machine_gallery import Actuators, Machines, Struts
-from bellcrank.web.pools import Busy, TimeLimitExceeded, make_pools
+from bellcrank.web.pools import Busy, ServerEnds, TimeLimitExceeded, make_pools
 from bellcrank.web.registries import registered
 from bellcrank.web.requests import ErrorResponse
+from bellcrank.web.results import StoredResults
 from bellcrank.web.scheduler import Scheduler
 from bellcrank.web.security import AccessControl
 from bellcrank.web.state import AppState, State
@@ -63,7 +64,9 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
     saved = SavedDesigns(folder / "designs")
     machines = Machines()
     gallery = Gallery(RunDesigns(jobs), saved, machines, BundledDesigns(), Actuators(), Struts())
-    state = AppState(jobs, Scheduler(jobs, searches), make_pools(), gallery, saved, machines)
+    stored = StoredResults(folder / "results")
+    scheduler = Scheduler(jobs, searches)
+    state = AppState(jobs, scheduler, make_pools(), gallery, saved, machines, stored)
 
     @contextlib.asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
@@ -72,7 +75,7 @@ def make_app(folder: Path, *, token: str | None = None, searches: int | None = N
         yield
         preparation.cancel()
         await state.scheduler.close()
-        state.pools.close()
+        state.pools.end()
 
     app = FastAPI(
         title="bellcrank",
@@ -177,6 +180,7 @@ def _add_error_handlers(app: FastAPI) -> None:
 def _status(error: Exception) -> int:
     kinds: tuple[tuple[type[Exception], int], ...] = (
         (Busy, 503),
+        (ServerEnds, 503),
         (TimeLimitExceeded, 503),
         (UnknownName, 404),
         (StorageError, 507),

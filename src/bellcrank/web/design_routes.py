@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from fastapi.responses import Response
 from starlette.concurrency import run_in_threadpool
 
+from bellcrank import __version__
 from bellcrank.errors import BellcrankError, InvalidFile
+from bellcrank.fem import levels
 from bellcrank.model import Design, unpack_mask
 from bellcrank.web import quick_calls, slow_calls
 from bellcrank.web.errors import plain_error
@@ -17,6 +20,7 @@ from bellcrank.web.gallery import design_data, entry_named
 from bellcrank.web.limits import MESSAGE
 from bellcrank.web.page_files import page_files
 from bellcrank.web.requests import (
+    ComputationsBody,
     DesignBody,
     FemBody,
     FileBody,
@@ -31,11 +35,14 @@ from bellcrank.web.task_files import problem_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from bellcrank.web.pools import Pool
     from bellcrank.web.state import AppState
 
 router = APIRouter(prefix="/api", tags=["designs"])
+WITH_SHARE = (slow_calls.validation, slow_calls.tolerance)
+"""Slow computations that write the fraction that is done."""
 
 
 async def _computed(
@@ -49,6 +56,26 @@ async def _computed(
     text = json.dumps(body.problem)
     key = function.__name__, text, body.mask, json.dumps(more, sort_keys=True)
     return await state.results.get(key, lambda: pool.call(function, text, body.mask, *more))
+
+
+def _slow_key(function: Callable[..., dict[str, Any]], body: PartBody, *more: Any) -> str:
+    """Return the text that the result of a slow computation follows from."""
+    data = [__version__, function.__name__, body.problem, body.mask, body.part, *more]
+    return json.dumps(data, sort_keys=True)
+
+
+async def _slow(
+    state: AppState, function: Callable[..., dict[str, Any]], body: PartBody, *more: Any
+) -> dict[str, Any]:
+    """Return the result of a slow computation on a part, which is also stored in a file."""
+    text = json.dumps(body.problem)
+
+    async def compute(share: Path) -> dict[str, Any]:
+        further = {"share": str(share)} if function in WITH_SHARE else {}
+        call = partial(function, text, body.mask, body.part, *more, **further)
+        return await state.pools.slow.call(call)
+
+    return await state.stored.get(_slow_key(function, body, *more), compute)
 
 
 @router.post("/motion")
@@ -72,7 +99,7 @@ async def describe_part(body: PartBody, state: State) -> dict[str, Any]:
 @router.post("/print")
 async def estimate_print(body: PartBody, state: State) -> dict[str, Any]:
     """Return printing time, layers and mass of the part of a design by the slicer."""
-    return await _computed(state, state.pools.slow, slow_calls.print_estimate, body, body.part)
+    return await _slow(state, slow_calls.print_estimate, body)
 
 
 @router.post("/response")
@@ -91,15 +118,35 @@ async def report_part(body: PartBody, state: State) -> dict[str, Any]:
 @router.post("/tolerance")
 async def get_tolerance(body: PartBody, state: State) -> dict[str, Any]:
     """Return what a design does over tolerances of print and drive, and without single struts."""
-    return await _computed(state, state.pools.slow, slow_calls.tolerance, body, body.part)
+    return await _slow(state, slow_calls.tolerance, body)
 
 
 @router.post("/validation")
 async def get_validation(body: FemBody, state: State) -> dict[str, Any]:
     """Return the finite-element analysis of the part of a design."""
-    return await _computed(
-        state, state.pools.slow, slow_calls.validation, body, body.part, body.level
-    )
+    return await _slow(state, slow_calls.validation, body, body.level)
+
+
+@router.post("/computations")
+async def list_computations(body: ComputationsBody, state: State) -> dict[str, Any]:
+    """Return what is known of the slow computations on a part; nothing is computed.
+
+    Each is null if it was not begun, has its ``result``, or, while it runs, the ``share`` that is
+    done. Without ``results``, only those that run are listed.
+    """
+
+    def read() -> dict[str, Any]:
+        def known(function: Callable[..., dict[str, Any]], *more: Any) -> dict[str, Any] | None:
+            key = _slow_key(function, body, *more)
+            return state.stored.state(key, running=not body.results)
+
+        return {
+            "validation": {level: known(slow_calls.validation, level) for level in levels},
+            "tolerance": known(slow_calls.tolerance),
+            "print": known(slow_calls.print_estimate),
+        }
+
+    return await run_in_threadpool(read)
 
 
 @router.post("/files/{suffix}", response_class=Response)

@@ -25,8 +25,15 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 
+ENDS = "the server has ended"
+
+
 class Busy(RunFailed):
     """The limit of waiting calls is reached."""
+
+
+class ServerEnds(RunFailed):
+    """The server ends before a computation."""
 
 
 class TimeLimitExceeded(RunFailed):
@@ -93,6 +100,7 @@ class Pool:
         self.processes, self.seconds, self.most = processes, seconds, waiting
         self._niceness, self._recycle = niceness, recycle
         self._taken = 0
+        self._ended = False
         self._executor: ProcessPoolExecutor | None = None
         self._lifeline: Connection | None = None
 
@@ -120,7 +128,11 @@ class Pool:
             If too many calls are waiting.
         TimeLimitExceeded
             If the call was ended.
+        ServerEnds
+            If the server ends.
         """
+        if self._ended:
+            raise ServerEnds(ENDS)
         if self._taken >= self.most:
             raise Busy("the server is busy with other requests; try again in a moment")
         self._taken += 1
@@ -128,7 +140,11 @@ class Pool:
             executor = self._started()
             submitted = executor.submit(limited, self.seconds, partial(function, *args, **kwargs))
             return await asyncio.wrap_future(submitted)
-        except BrokenProcessPool:
+        except (BrokenProcessPool, asyncio.CancelledError) as error:
+            if self._ended:
+                raise ServerEnds(ENDS) from None
+            if isinstance(error, asyncio.CancelledError):
+                raise
             self._drop(executor)
             raise TimeLimitExceeded(
                 f"this took more than {self.seconds} s or too much memory and was ended; "
@@ -153,10 +169,14 @@ class Pool:
     def _drop(self, executor: ProcessPoolExecutor) -> None:
         """Discard processes of which one has died; the next call starts new ones."""
         if self._executor is executor:
-            self.close()
+            self._close()
 
-    def close(self) -> None:
-        """End the processes, including running calls; waiting calls are dropped."""
+    def end(self) -> None:
+        """End the processes, running and waiting calls, and accept no more calls."""
+        self._ended = True
+        self._close()
+
+    def _close(self) -> None:
         if self._lifeline is not None:
             self._lifeline.close()
             self._lifeline = None
@@ -188,10 +208,10 @@ class Pools:
         await self.quick.prepare()
         await self.thorough.prepare()
 
-    def close(self) -> None:
+    def end(self) -> None:
         """End all processes."""
         for pool in (self.quick, self.thorough, self.slow):
-            pool.close()
+            pool.end()
 
 
 def make_pools() -> Pools:

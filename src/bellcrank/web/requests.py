@@ -113,6 +113,12 @@ class FemBody(PartBody):
     level: Level = "frame"
 
 
+class ComputationsBody(PartBody):
+    """A design whose slow computations are listed, with their results or without."""
+
+    results: bool = True
+
+
 class SaveDesignBody(DesignBody):
     """A design to be stored in the gallery."""
 

@@ -1,16 +1,25 @@
-"""Results of computations on designs, which are kept while the server runs."""
+"""Results of computations on designs, kept while the server runs; slow ones also in files."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import hashlib
+import json
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
+from bellcrank.errors import BellcrankError
+from bellcrank.model.storage import read_text, write_text
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Hashable
+    from pathlib import Path
 
 MOST_RESULTS = 64
-"""Number of results, up to two megabytes each."""
+"""Number of results in memory, up to two megabytes each."""
+MOST_FILES = 256
+"""Number of results in files."""
 
 
 class Results:
@@ -54,3 +63,91 @@ class Results:
         except Exception:
             self._known.pop(key, None)
             raise
+
+    def is_running(self, key: Hashable) -> bool:
+        """Whether a result is being computed."""
+        task = self._known.get(key)
+        return task is not None and not task.done()
+
+
+class StoredResults:
+    """Results of slow computations in files, which a restarted server finds again.
+
+    Parameters
+    ----------
+    folder
+        Folder of the files; created at the first result.
+    most
+        Largest number of results; the oldest is deleted.
+    """
+
+    def __init__(self, folder: Path, most: int = MOST_FILES) -> None:
+        self._folder, self._most = folder, most
+        self._results = Results()
+
+    async def get(
+        self, key: str, compute: Callable[[Path], Coroutine[Any, Any, dict[str, Any]]]
+    ) -> dict[str, Any]:
+        """Return a result, computed if it is not known; failures are not kept.
+
+        Parameters
+        ----------
+        key
+            Text that the result follows from.
+        compute
+            Function of a file into which the computation writes the fraction that is done.
+        """
+        return await self._results.get(key, lambda: self._computed(key, compute))
+
+    def state(self, key: str, *, running: bool = False) -> dict[str, Any] | None:
+        """Return what is known of a computation: ``result``, or ``share`` while it runs.
+
+        None if it was not begun, or if it does not run and only that is asked for. The share is
+        None if it is not known.
+        """
+        if self._results.is_running(key):
+            return {"share": _share(self._path(key, "share"))}
+        found = None if running else self._stored(key)
+        return None if found is None else {"result": found}
+
+    async def _computed(
+        self, key: str, compute: Callable[[Path], Coroutine[Any, Any, dict[str, Any]]]
+    ) -> dict[str, Any]:
+        found = self._stored(key)
+        if found is not None:
+            return found
+        share = self._path(key, "share")
+        self._folder.mkdir(parents=True, exist_ok=True)
+        try:
+            found = await compute(share)
+        finally:
+            share.unlink(missing_ok=True)
+        with contextlib.suppress(BellcrankError):  # on a full disk the result is not kept
+            write_text(self._path(key, "json"), json.dumps(found), overwrite=True)
+            self._drop_oldest()
+        return found
+
+    def _stored(self, key: str) -> dict[str, Any] | None:
+        """Return the result in its file; None without a file, or if it is damaged."""
+        path = self._path(key, "json")
+        try:
+            found: dict[str, Any] = json.loads(read_text(path)) if path.exists() else {}
+        except (BellcrankError, ValueError):
+            return None
+        return found or None
+
+    def _path(self, key: str, suffix: str) -> Path:
+        return self._folder / f"{hashlib.sha256(key.encode()).hexdigest()[:24]}.{suffix}"
+
+    def _drop_oldest(self) -> None:
+        files = sorted(self._folder.glob("*.json"), key=lambda path: path.stat().st_mtime)
+        for path in files[: -self._most]:
+            path.unlink(missing_ok=True)
+
+
+def _share(path: Path) -> float | None:
+    """Return the fraction that a computation has written; None if there is none yet."""
+    try:
+        return float(path.read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return None

@@ -104,14 +104,22 @@ def serve(settings: ServerSettings, announce: Callable[[str], None]) -> None:
             app, log_level="warning", ws_max_size=MESSAGE, ws="websockets-sansio",
             server_header=False, timeout_graceful_shutdown=3, limit_concurrency=400,
         )  # fmt: skip
-        server = uvicorn.Server(config)
+
+        class Server(uvicorn.Server):
+            """A server that ends its computations first, so that requests do not wait for them."""
+
+            async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+                app.state.bellcrank.pools.end()
+                await super().shutdown(sockets)
+
+        server = Server(config)
         port = listener.getsockname()[1]
         host = address_of(settings.host)
         announce(f"http://{host}:{port}/" + (f"?token={token}" if token else ""))
         try:
             server.run(sockets=[listener])
         finally:  # after a second Ctrl-C the server skips its own shutdown
-            app.state.bellcrank.pools.close()
+            app.state.bellcrank.pools.end()
 
 
 def address_of(host: str) -> str:

@@ -5,6 +5,7 @@ Arguments and results are plain data.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from dataclasses import replace
@@ -35,6 +36,8 @@ GIF_SIZE = (720, 404)
 GIF_FPS = 20
 BODIES = {"plane": "sheet", "solid": "solid"}
 """Names of the models of the printed body in which a specification is computed, by level."""
+LEAST_SHARE = 0.01
+"""Smallest change of the fraction of a computation that is written."""
 MAX_VERTICES = 60_000
 """Largest number of vertices of a picture of stress."""
 
@@ -128,6 +131,27 @@ def _export(design: Design, spec: PartSpec, path: Path, grips: Grips) -> None:
     export(bundle_of(design, spec, grips, layer=LAYER), path)
 
 
+class ShareFile:
+    """A file with the fraction of a computation that is done, for another process.
+
+    Parameters
+    ----------
+    path
+        Path of the file; empty for none.
+    """
+
+    def __init__(self, path: str) -> None:
+        self._path = path
+        self._written = 0.0
+
+    def __call__(self, share: float) -> None:
+        """Write the fraction, unless it has hardly changed."""
+        if self._path and share - self._written >= LEAST_SHARE:
+            self._written = share
+            with contextlib.suppress(OSError):
+                Path(self._path).write_text(f"{share:.3f}", encoding="ascii")
+
+
 def part_summary(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     """Return size, mass and stroke of a part, and remarks on its printability."""
     from bellcrank.part import PartSpec
@@ -191,8 +215,13 @@ def print_estimate(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]
     }
 
 
-def tolerance(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
+def tolerance(text: str, mask: str, part: dict[str, Any], share: str = "") -> dict[str, Any]:
     """Return what a design does as a part in scenarios of tolerance, with the usual deviations.
+
+    Parameters
+    ----------
+    share
+        File for the fraction of the scenarios that is computed; empty for none.
 
     Returns
     -------
@@ -210,7 +239,14 @@ def tolerance(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     )
 
     spec, design = PartSpec.from_dict(part), design_of(text, mask)
-    report = compute_tolerance(design, deviations_of(design, spec), spec, workers=1)
+    write = ShareFile(share)
+    report = compute_tolerance(
+        design,
+        deviations_of(design, spec),
+        spec,
+        lambda done, total: write(done / total),
+        workers=1,
+    )
     assert report is not None  # without a request to stop
     losses = report.tolerance.strut_losses()
     return {
@@ -220,8 +256,15 @@ def tolerance(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def validation(text: str, mask: str, part: dict[str, Any], level: str) -> dict[str, Any]:
+def validation(
+    text: str, mask: str, part: dict[str, Any], level: str, share: str = ""
+) -> dict[str, Any]:
     """Analyse a design as a part by finite elements.
+
+    Parameters
+    ----------
+    share
+        File for the fraction of the analysis that is done; empty for none.
 
     Returns
     -------
@@ -237,7 +280,10 @@ def validation(text: str, mask: str, part: dict[str, Any], level: str) -> dict[s
     spec, design = PartSpec.from_dict(part), design_of(text, mask)
     # The specification is that of the part that is shown.
     design = replace(design, provenance={"part": part})
-    validation = validate(design, spec, [(level, FemSettings())])
+    stages, write = 1 + design.problem.is_specified, ShareFile(share)
+    validation = validate(
+        design, spec, [(level, FemSettings())], lambda index, done: write((index + done) / stages)
+    )
     analysis = validation.analyses[0]
     data: dict[str, Any] = validation.to_dict()["results"][0]
     field = analysis.field

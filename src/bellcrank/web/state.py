@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
-from bellcrank.web.results import Results
+from bellcrank.web.results import Results, StoredResults
 
 if TYPE_CHECKING:
     from bellcrank.web.gallery import Gallery, SavedDesigns
@@ -36,6 +36,7 @@ class AppState:
     gallery: Gallery
     saved: SavedDesigns
     machines: Machines
+    stored: StoredResults
     results: Results = field(default_factory=Results)
     ready: bool = False
     error: str = ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import InvalidSettings
@@ -133,12 +134,14 @@ class Validation:
         }
 
 
-def with_specification(validation: Validation) -> Validation:
+def with_specification(
+    validation: Validation, report: Callable[[float], None] = lambda _share: None
+) -> Validation:
     """Return a validation with the items of the specification and the figures of its outputs.
 
     Unchanged without a specification, and for another part than the one that it was written for.
     The sheet is computed if the plan has the level ``plane``, the solid of a part in space if it
-    has the level ``solid``.
+    has the level ``solid``; `report` is called with the fraction of it that is done.
     """
     if not validation.has_items:
         return validation
@@ -154,7 +157,12 @@ def with_specification(validation: Validation) -> Validation:
         from bellcrank.fem.specification import sheet_records
 
         assert problem.specification is not None
-        records = sheet_records(spec.of(design), sizes[0], quantities=SHEET_QUANTITIES)
+        names = list(problem.cases)
+
+        def progress(name: str, share: float) -> None:
+            report((names.index(name) + share) / len(names))
+
+        records = sheet_records(spec.of(design), sizes[0], progress, quantities=SHEET_QUANTITIES)
         if records is not None:
             found[name] = item_results(problem.specification.items, records)
             figures[name] = sheet_figures(problem, spec, records)
@@ -271,7 +279,8 @@ def validate(
     plan
         Levels and settings, in order.
     report
-        Called with the index in the plan and the fraction of the stroke reached.
+        Called with the index in the plan and the fraction of the stroke reached; for the items of
+        a specification, computed last, with the length of the plan and the fraction done.
     save
         Called after each analysis with all results so far, so that no result is lost if a later
         analysis is interrupted.
@@ -300,7 +309,7 @@ def validate(
         validation = replace(validation, analyses=[*validation.analyses, analysis])
         save(validation)
     if validation.has_items:
-        validation = with_specification(validation)
+        validation = with_specification(validation, partial(report, len(plan)))
         save(validation)
     return validation
 
