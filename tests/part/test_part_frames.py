@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 
 from bellcrank.errors import BellcrankError, InvalidProblem, InvalidSettings, UnknownName
 from bellcrank.fem import FemSettings
+from bellcrank.machines.library import library
+from bellcrank.machines.library.tasks import straight_motion
 from bellcrank.model import (
     Elasticity,
     Input,
@@ -21,8 +23,9 @@ from bellcrank.model import (
     find_problem,
 )
 from bellcrank.part import Material, Part, PartSpec, frame_problem, materials, spring_problem
+from bellcrank.task.units import units_of
 from bellcrank.workflows.fabricate import Grips
-from bellcrank.workflows.validation import validate
+from bellcrank.workflows.validation import spec_for, validate
 
 
 def in_space() -> Problem:
@@ -142,3 +145,22 @@ def test_work_in_the_plane_names_the_problem_in_space_that_it_refuses() -> None:
     ):
         with pytest.raises(BellcrankError, match=message):
             work()
+
+
+def test_a_refined_design_keeps_the_unit_of_its_loads() -> None:
+    """Its nodes have moved, so that its beams are not one lattice unit long on average."""
+    design = library().find("up-7-straight-10g").design
+    spec = spec_for(design)
+    problem = straight_motion(design.problem, 0.1, spec)
+    again = frame_problem(problem, spec)
+    assert float(problem.lattice.rest_length.mean()) != pytest.approx(1.0, abs=0.01)
+    assert again.material == problem.material
+    assert problem.specification is not None
+    payload = next(item for item in problem.specification.items if item.quantity == "payload")
+    assert payload.at_least is not None
+    assert payload.at_least * units_of(again, spec).force == pytest.approx(0.1)
+    # Half the width has half the area: the same stiffness of a beam has twice the modulus.
+    narrow = frame_problem(problem, replace(spec, width=1.0, joint=0.3))
+    assert problem.material is not None
+    assert narrow.material is not None
+    assert narrow.material.young == pytest.approx(2.0 * problem.material.young)

@@ -61,6 +61,10 @@ def frame_problem(problem: Problem, spec: PartSpec) -> Problem:
     material = frame_elasticity(problem.lattice, section, spec, problem.stiffness)
     widths, joints = problem.widths, problem.joints
     if problem.section is not None:
+        assert problem.material is not None
+        # Loads and bounds are in units of the stiffness of the beams, which has to stay.
+        young = problem.material.young * problem.section.area / section.area
+        material = replace(material, young=young)
         ratio = section.width / problem.section.width
         widths = None if widths is None else widths * ratio
         joints = joints * ratio if joints is not None and spec.keeps_joints(problem) else None
