@@ -85,12 +85,15 @@ export function openTask(task: Task): void {
 /** Settings of the latest search of this tab. */
 export function storedSettings(): Settings {
   try {
-    return { ...SETTINGS, ...JSON.parse(sessionStorage.getItem(SETTINGS_KEY) ?? "{}") as Partial<Settings>, fromHand: false };
+    return { ...SETTINGS, ...JSON.parse(sessionStorage.getItem(SETTINGS_KEY) ?? localStorage.getItem(SETTINGS_KEY) ?? "{}") as Partial<Settings>, fromHand: false };
   } catch {
     return SETTINGS;
   }
 }
 
 export function storeSettings(settings: Settings): void {
-  try { sessionStorage.setItem(SETTINGS_KEY, JSON.stringify(settings)); } catch { /* the storage is full: the settings hold for this page only */ }
+  try {
+    // Each tab keeps its own settings; a new one begins with those that were stored last.
+    for (const storage of [sessionStorage, localStorage]) storage.setItem(SETTINGS_KEY, JSON.stringify(settings));
+  } catch { /* the storage is full: the settings hold for this page only */ }
 }
