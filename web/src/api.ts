@@ -70,7 +70,7 @@ export interface PartReport {
 }
 
 /** A part over tolerances: rows of texts, and what the loss of each strut costs. */
-export interface ToleranceFound { sentence: string; rows: string[][]; losses: { beams: number[]; cost: (number | null)[] } }
+export interface ToleranceFound { sentence: string; prints: number; met: number; rows: string[][]; losses: { beams: number[]; cost: (number | null)[] } }
 
 export interface Response {
   status: string;
@@ -141,7 +141,7 @@ export interface RunUpdate {
   speed: number | null;
   left: number | null;
   tried: [number, number] | null;
-  refined: { designs: number; geometries: number; sheets: number; /** Largest number of geometries. */ most: number; objective: number | null } | null;
+  refined: { designs: number; geometries: number; sheets: number; /** Largest number of geometries. */ most: number; /** Seconds that all of them would take. */ left: number | null; objective: number | null } | null;
   /** The displayed design, with the nodes of its problem if it is refined; null for the one sent before. */
   moved: { mask: string; problem: Problem | null; efficiency: number | null; displacement: number[] | null; items: ItemState[] | null; objectives: Objective[] } | null;
   error?: { message: string };

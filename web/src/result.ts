@@ -72,7 +72,7 @@ export class Result {
   private readonly knownOf = new Map<string, Known>();
   private following = false;
   private closed = false;
-  private grips = { plate: false, screws: 0, pad: false };
+  private grips = { plate: false, screws: 0, pad: false, output_pad: false };
 
   constructor(private readonly subject: Subject) {
     this.part = partOf(subject);
@@ -221,7 +221,7 @@ export class Result {
     const pending = found === "running" ? `; ${words}, is ${this.shareText(level).replace("computing", "being computed")}` : !solid ? `; not checked in ${words}` : !solid.items ? `; not stable in ${words}` : "";
     const by = solid?.items ? ` by frames and in ${words}` : " by frames";
     clear(this.verdict, unstable ? "The part snaps or collapses before the full stroke, by frames with 8 elements in each strut."
-      : last ? `${verdictOf(last)}${isMet || !solid?.items ? by : ` in ${words}`}${pending}.` : "No specification: the task says nothing about straightness, rotation or load.");
+      : last ? `${verdictOf(last)}${isMet || !solid?.items ? by : ` in ${words}`}${pending}.${this.printedText()}` : "No specification: the task says nothing about straightness, rotation or load.");
     const models: [string, PartFigures[]][] = [["frames", report.figures]];
     if (solid?.figures) models.push([title, solid.figures]);
     clear(this.reportBox, columns.length > 0 && itemTable(columns), figureTable(figureColumns(models)));
@@ -231,6 +231,12 @@ export class Result {
       : !last && (first.efficiency ?? 0) <= 0 ? "The output does not move in its direction."
       : better !== null && this.subject.efficiency !== null && better > this.subject.efficiency ? "The design drawn by hand has a higher efficiency." : "";
     clear(this.advice, defect && h("p", {}, defect), defect && h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text))));
+  }
+
+  /** How many random prints meet all items, if the tolerance is known. */
+  private printedText(): string {
+    const { tolerance } = this.known;
+    return tolerance && typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} meet all items.` : "";
   }
 
   private showTable(): void {
@@ -293,6 +299,7 @@ export class Result {
       known.tolerance = sentence((error as ServerError).message);
     }
     this.showTolerance();
+    this.showTable();
   }
 
   /** What the part does when print and drive deviate, and which struts it needs. */
@@ -306,10 +313,13 @@ export class Result {
     if (tolerance === "running") { clear(this.toleranceBox, h("p", { class: "more" }, h("span", { class: "working" }), this.shareText("tolerance"))); return; }
     if (typeof tolerance === "string") { clear(this.toleranceBox, h("p", { class: "fault", role: "alert" }, tolerance)); return; }
     const [head, ...rows] = tolerance.rows;
-    const shown = head!.map((name, k) => ({ name, k })).filter(({ name }) => name !== "wanted");
+    // The narrow panel shows first what counts most.
+    const order = ["item", "drawn", "yield", "95 %"];
+    const place = (name: string): number => (order.includes(name) ? order.indexOf(name) : order.length);
+    const shown = head!.map((name, k) => ({ name, k })).filter(({ name }) => name !== "wanted").sort((a, b) => place(a.name) - place(b.name));
     clear(this.toleranceBox, h("p", {}, sentence(tolerance.sentence)),
       h("div", { class: "report", tabindex: 0, role: "region", "aria-label": "Tolerance" },
-        h("table", { class: "items tolerance" }, h("caption", {}, "Values as drawn, and the worst of each kind of scenario"),
+        h("table", { class: "items tolerance" }, h("caption", {}, "As drawn; part of the random prints that meet the item, and the value that 95 % of them reach; the worst for other widths (20 % narrower to 10 % wider), input directions (5°), strokes (half and one and a half), and of the prints"),
           h("thead", {}, h("tr", {}, ...shown.map(({ name }) => h("th", { scope: "col" }, name)))),
           h("tbody", {}, ...rows.map((row) => h("tr", {}, ...shown.map(({ k }) => (k === 0 ? h("th", { scope: "row" }, row[k]!, h("small", {}, row[1]!)) : h("td", {}, row[k]!)))))))),
       this.lossText(tolerance.losses));
@@ -427,19 +437,19 @@ export class Result {
     const waits = Object.values(this.known.fems).includes("running") || this.known.tolerance === "running" || this.known.print === "running";
     clear(this.filesBox,
       !isInSpace(this.subject.problem) && this.gripFields(),
+      fault && h("p", { class: "fault", role: "alert" }, fault),
       h("div", { class: "files" },
         ...(this.registries?.files ?? []).filter(this.isOffered).map(({ name: suffix, title, purpose }) => h("button", {
           type: "button", class: this.writing === suffix ? "file busy" : "file", disabled: this.writing !== "", "data-file": suffix,
           onclick: () => void this.downloadFile(suffix),
         }, h("strong", {}, title), h("span", {}, this.writing === suffix ? (waits ? "written after the other computations …" : "writing …") : purpose))),
         this.subject.history && h("button", { type: "button", class: "file", "data-file": "history", disabled: this.writing !== "", onclick: () => void this.downloadHistory() },
-          h("strong", {}, "History"), h("span", {}, "all proposals"))),
-      fault && h("p", { class: "fault", role: "alert" }, fault));
+          h("strong", {}, "History"), h("span", {}, "all proposals"))));
   }
 
   /** How the printed part is held and pushed. */
   private gripFields(): HTMLElement {
-    const tick = (key: "plate" | "pad", text: string): HTMLElement => {
+    const tick = (key: "plate" | "pad" | "output_pad", text: string): HTMLElement => {
       const box = h("input", { type: "checkbox", checked: this.grips[key], "data-key": key });
       box.addEventListener("change", () => {
         this.grips = { ...this.grips, [key]: box.checked, ...(key === "plate" && !box.checked ? { screws: 0 } : {}) };
@@ -450,7 +460,8 @@ export class Result {
     const screws = number(this.grips.screws, { min: 0, max: 12, step: 1 }, (value) => { this.grips = { ...this.grips, screws: Math.min(12, Math.max(0, Math.round(value))) }; });
     screws.dataset.key = "screws";
     return h("div", { class: "grips" }, tick("plate", "Fill the supports to a plate for clamping"),
-      this.grips.plate && field("Screw holes, 3.4 mm", screws), tick("pad", "Fill the input to a pad for pushing"));
+      this.grips.plate && field("Screw holes, 3.4 mm", screws), tick("pad", "Fill the input to a pad for pushing"), tick("output_pad", "Fill the output to a pad for mounting"),
+      (this.grips.plate || this.grips.pad || this.grips.output_pad) && h("p", { class: "note" }, "A row of nodes at a side gets a plate outside of the part, which makes it larger than the size above."));
   }
 
   private async downloadFile(suffix: string): Promise<void> {

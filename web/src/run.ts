@@ -74,7 +74,7 @@ export class RunPage {
     if (!search) return;
     this.method = search;
     const curve = search.running_best ? "The best design of each chain so far." : "The current design of each chain.";
-    const missed = this.run.problem.specification ? " Designs that miss more than the refinement can mend have no point." : "";
+    const missed = this.run.problem.specification ? " Only designs that meet the items, or miss them by what a refinement mends, have a point in the chart." : "";
     this.curveNote.textContent = `${curve}${missed}${this.run.settings.replicas === undefined ? " Shaded: phases of higher temperature." : ""}`;
     this.show(this.run);
   }
@@ -201,6 +201,7 @@ export class RunPage {
       ...(running && phase === "search" ? [["speed", this.update?.speed ? `${Math.round(this.update.speed).toLocaleString("en")} steps/s` : "starting …"], ["left of this phase", duration(this.update?.left)]] as [string, string][] : []),
       ...(running && tried && !refined ? [["candidates verified", `${tried[0]} of at most ${tried[1]}`]] as [string, string][] : []),
       ...(refining ? [["refinement", refining]] as [string, string][] : []),
+      ...(running && refined?.left != null ? [["left at most", duration(refined.left)]] as [string, string][] : []),
       ["method", `${this.method?.title ?? run.method}, ${count(settings.chains, "chain")}, seed ${settings.seed}`],
       ...(settings.goals.length ? [["constraints", settings.goals.join(", ")]] as [string, string][] : []),
     ];

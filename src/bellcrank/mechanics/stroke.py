@@ -24,7 +24,7 @@ STATES = 16
 
 
 def at_fraction(problem: Problem, fraction: float) -> Problem:
-    """Return a problem with a fraction of its input.
+    """Return a problem with a fraction of its input and of its loads, which grow with the input.
 
     Raises
     ------
@@ -44,7 +44,14 @@ def at_fraction(problem: Problem, fraction: float) -> Problem:
             f"problem {problem.name!r}: expected inputs that move along the whole stroke, got "
             "input.during; a fraction of such a stroke is not a problem with a smaller input"
         )
-    return replace(problem, input=replace(problem.input, amount=fraction * problem.input.amount))
+    given, loads = problem.input, problem.loads
+    forces = tuple(replace(each, force=fraction * each.force) for each in loads.forces)
+    weight = None if loads.weight is None else fraction * loads.weight
+    return replace(
+        problem,
+        input=replace(given, amount=fraction * given.amount),
+        loads=replace(loads, forces=forces, weight=weight),
+    )
 
 
 def increment_at(fraction: float) -> float:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NodeForce:
-    """Dead forces on nodes; they grow in proportion to the input.
+    """Forces on nodes with fixed directions; they grow in proportion to the input.
 
     Parameters
     ----------

@@ -153,7 +153,9 @@ async def list_computations(body: ComputationsBody, state: State) -> dict[str, A
 async def make_file(suffix: FileSuffix, body: FileBody, state: State) -> Response:
     """Return a file of a design for printing, cutting, viewing or simulation."""
     about = {"efficiency": body.efficiency, "provenance": body.provenance}
-    grips = {"plate": body.plate, "screws": body.screws, "pad": body.pad}
+    grips = {
+        "plate": body.plate, "screws": body.screws, "pad": body.pad, "output_pad": body.output_pad
+    }  # fmt: skip
     text = json.dumps(body.problem)
     pool = state.pools.thorough if page_files[suffix].quick else state.pools.slow
     content = await pool.call(

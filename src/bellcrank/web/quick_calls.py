@@ -20,6 +20,7 @@ from bellcrank.mechanics.output import best_fit_rotation
 from bellcrank.model import Design, human_design, unpack_mask
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search import SpecificationEvaluator
+from bellcrank.search.clearance import gap_of_frame
 from bellcrank.search.verdict import Verdict
 from bellcrank.search.verification import ELEMENTS
 from bellcrank.web.items import item_states, objective_states
@@ -72,7 +73,8 @@ def specification_of(problem: Problem) -> SpecificationEvaluator | None:
         return None
     # The design itself counts, not the symmetric one that a search would make of it.
     own = replace(problem.specification, symmetry=())
-    return SpecificationEvaluator(replace(problem, specification=own))
+    # The gap of a search is less the sum of all overlaps, which is no length of the part.
+    return SpecificationEvaluator(replace(problem, specification=own), gap=gap_of_frame)
 
 
 def design_of(text: str, mask: str) -> Design:

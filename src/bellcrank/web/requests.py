@@ -97,7 +97,8 @@ class PartBody(DesignBody):
 class FileBody(PartBody):
     """A design to be written as a file.
 
-    In the plane the supports can be filled to a plate with screw holes, and the input to a pad.
+    In the plane the supports can be filled to a plate with screw holes, and the input and the
+    output to pads.
     """
 
     efficiency: float | None = None
@@ -105,6 +106,7 @@ class FileBody(PartBody):
     plate: bool = False
     screws: int = Field(default=0, ge=0, le=12)
     pad: bool = False
+    output_pad: bool = False
 
 
 class FemBody(PartBody):

@@ -227,6 +227,7 @@ def tolerance(text: str, mask: str, part: dict[str, Any], share: str = "") -> di
     -------
     dict
         ``sentence`` on the scenarios; ``rows`` of texts, the first with the names of the columns;
+        ``met``, the number of random ``prints`` that meet all items;
         ``losses``, the part of the efficiency that the loss of each strut costs: ``beams``, and
         ``cost``, None where the full stroke is not reached.
     """
@@ -248,9 +249,11 @@ def tolerance(text: str, mask: str, part: dict[str, Any], share: str = "") -> di
         workers=1,
     )
     assert report is not None  # without a request to stop
-    losses = report.tolerance.strut_losses()
+    losses, prints = report.tolerance.strut_losses(), report.tolerance.of_kind("print")
     return {
         "sentence": tolerance_sentence(report),
+        "prints": len(prints),
+        "met": sum(report.tolerance.results[number].met for number in prints),
         "rows": tolerance_rows(report),
         "losses": {"beams": list(losses), "cost": [finite(each) for each in losses.values()]},
     }

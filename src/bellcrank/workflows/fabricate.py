@@ -128,9 +128,9 @@ class Grips:
             solid = filled(outline, shown, drawn, nodes, width)
             if self.strict and solid.hole_count == outline.hole_count:
                 raise InvalidSettings(
-                    f"{name}: no hole lies between struts that join its nodes only, and its nodes "
-                    "are no row at the boundary of the part; select nodes of two rows, or of one "
-                    "row at the boundary"
+                    f"{name}: there is nothing to fill: its nodes enclose no hole, and they are "
+                    "no row at a side of the part; in the task, select nodes of two neighbouring "
+                    "rows, or of the whole row at a side"
                 )
             outline = solid
         if self.screws:

@@ -235,3 +235,25 @@ def test_nodes_that_do_not_exist_are_refused() -> None:
         filled(outline, *triangular(3, 3), [0, 9])
     with pytest.raises(InvalidSettings, match="nodes: expected one or more numbers of nodes"):
         filled(outline, *triangular(3, 3), [])
+
+
+@pytest.mark.parametrize("inclined", [False, True])
+def test_the_left_side_of_a_triangular_lattice_gets_a_straight_plate(inclined: bool) -> None:
+    """Its nodes are alternately half a spacing inside."""
+    rows = np.arange(6)
+    side = np.column_stack([5.0 * (rows % 2), 8.66 * rows])
+    positions = np.vstack([side, [[20.0, 8.66], [20.0, 30.0]]])
+    if inclined:
+        turn = np.array([[0.8, -0.6], [0.6, 0.8]])
+        positions = positions @ turn.T
+    beams = [[k, k + 1] for k in range(5)] + [[1, 6], [3, 7], [6, 7]]
+    places, pairs, block = with_outer_rows(positions, beams, rows, depth=6.0, reach=18.0)
+    added = places[len(positions) :]
+    if inclined:
+        added = added @ turn
+    assert added == pytest.approx(np.column_stack([np.full(6, -6.0), 8.66 * rows]))
+    assert block.tolist() == [*range(6), *range(8, 14)]
+    before = strut_outline(positions, beams, 2.0, 0.2)
+    outline = strut_outline(places, pairs, 2.0, 0.2)
+    assert filled(before, positions, beams, rows, 2.0).hole_count == before.hole_count == 1
+    assert filled(outline, places, pairs, block, 2.0).hole_count == 1

@@ -15,8 +15,11 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
     Ids = NDArray[np.int64]
 
-_ROW_WIDTH = 1e-3
-"""Width of a row of nodes on a line over its length."""
+_ROW_WIDTH = 0.3
+"""Largest width of a row over the largest distance of neighbours: that of the left or right side of
+a triangular lattice, whose nodes are alternately half a spacing inside."""
+_ON_LINE = 1e-3
+"""Distance from a line over its length within which nodes lie on it."""
 
 
 def with_outer_rows(
@@ -30,8 +33,9 @@ def with_outer_rows(
     """Return nodes and beams with a row of nodes outside of each row of given nodes.
 
     Nodes in a row at the boundary enclose no holes. A second row of nodes outside, joined to them
-    by struts, encloses holes that `filled` makes a plate. Rows are of two or more nodes on a line;
-    a row with struts on both sides gets none.
+    by struts, encloses holes that `filled` makes a plate. Rows are of two or more nodes on a line,
+    or alternately up to 0.3 of `reach` beside it; a row with struts on both sides gets none. The
+    new rows are straight.
 
     Parameters
     ----------
@@ -42,7 +46,7 @@ def with_outer_rows(
     nodes : (k,) array_like of int
         Nodes of the block, for example all supports.
     depth : float, mm
-        Distance of the new rows.
+        Distance of the new rows from the outermost nodes.
     reach : float, mm
         Largest distance of neighbours in a row.
     margin : float, mm
@@ -80,11 +84,12 @@ def with_outer_rows(
     whole, added = [places], []
     first = len(places)
     for row in range(count):
-        line = _outer_line(places, pairs, block[row_of == row], depth, margin)
+        line = _outer_line(places, pairs, block[row_of == row], _ROW_WIDTH * reach, depth, margin)
         if line is None:
             continue
         own, outward = line
-        whole.append(places[own] + depth * outward)
+        heights = places[own] @ outward
+        whole.append(places[own] + np.outer(heights.max() + depth - heights, outward))
         inner, outer = own.tolist(), list(range(first, first + len(own)))
         first += len(own)
         added += [pair for pair in pairwise(inner) if tuple(sorted(pair)) not in known]
@@ -96,31 +101,49 @@ def with_outer_rows(
 
 
 def _outer_line(
-    places: Reals, pairs: Ids, nodes: Ids, depth: float, margin: float
+    places: Reals, pairs: Ids, nodes: Ids, width: float, depth: float, margin: float
 ) -> tuple[Ids, Reals] | None:
-    """Return nodes in their order on a line, and the side on which there is room for a row.
+    """Return nodes in their order along a row, and the side on which there is room for another.
 
-    None if they are not on a line, or there are other nodes on both sides, or struts to them.
+    None if the row is wider than `width`, or there are other nodes on both sides, or struts to
+    them.
     """
     if len(nodes) < 2:
         return None
     centre = places[nodes].mean(axis=0)
-    _, sizes, axes = np.linalg.svd(places[nodes] - centre)
-    if sizes[1] > _ROW_WIDTH * sizes[0]:
+    order, along = _along(places, nodes)
+    across = np.array([-along[1], along[0]])
+    own, others = (places[nodes] - centre) @ across, places - centre
+    if np.ptp(own) > width:
         return None
-    along, across = axes
-    order = nodes[np.argsort(places[nodes] @ along)]
     used, joined = np.unique(pairs), np.unique(pairs[np.isin(pairs, nodes).any(axis=1)])
     away = places[used].mean(axis=0) - centre
     outward = -across if away @ across > 0.0 else across
-    others = places - centre
     ends = others[nodes] @ along
     low, high = ends.min() - margin, ends.max() + margin
     for side in (outward, -outward):
-        above = others @ side > _ROW_WIDTH * sizes[0]
+        top = float((others[nodes] @ side).max())
+        # Nodes between those of the row are beside it, unless they are on its inner side.
+        above = others @ side > top - np.ptp(own) + _ON_LINE * np.ptp(ends)
+        above[nodes] = False
         within = (others @ along > low) & (others @ along < high)
-        near = np.isin(np.arange(len(places)), used) & (others @ side < depth + margin)
+        near = np.isin(np.arange(len(places)), used) & (others @ side < top + depth + margin)
         near[joined] = True
         if not (above & within & near).any():
             return order, side
     return None
+
+
+def _along(places: Reals, nodes: Ids) -> tuple[Ids, Reals]:
+    """Return nodes in their order along a row, and its unit direction.
+
+    The direction joins two nodes near the ends, such that the row is narrowest: nodes that lie
+    alternately on two lines have an end on each, and their principal axis is inclined.
+    """
+    centred = places[nodes] - places[nodes].mean(axis=0)
+    order = nodes[np.argsort(centred @ np.linalg.svd(centred)[2][0])]
+    first, last = places[order[:2]], places[order[-2:]]
+    chords = [b - a for a in first for b in last if np.linalg.norm(b - a) > 0.0]
+    lines = [chord / np.linalg.norm(chord) for chord in chords]
+    widths = [np.ptp(centred @ np.array([-y, x])) for x, y in lines]
+    return order, lines[int(np.argmin(np.round(widths, 9)))]
