@@ -91,6 +91,20 @@ def test_ports_edges_and_zones_follow_the_sides_of_a_part_of_another_size(page: 
     assert set(expected) == {0.0, 10.0, 20.0}
 
 
+def test_nodes_that_lie_differently_after_a_change_of_size_are_named(page: Any) -> None:
+    """Two nodes of a row may be nearest to places in two rows of the new lattice."""
+    page.get_by_role("button", name="Empty rectangle").click()
+    until(page, lambda: summary(page, "supports") == "none")
+    tool(page, "Outputs")
+    click(page, *node(page, 0.1, 7.1))
+    click(page, *node(page, 1.1, 7.1))
+    until(page, lambda: summary(page, "outputs") == "2 nodes")
+    section(page, "domain")
+    fill(page, "Height", "80")
+    until(page, lambda: task(page)["table"]["domain"]["size"][1] == 80)
+    page.get_by_text("lie differently beside each other: output 1").wait_for()
+
+
 def test_a_button_stays_under_the_pointer_when_the_panel_is_drawn_again(page: Any) -> None:
     tool(page, "Outputs")
     arrow = page.get_by_label("up", exact=True)

@@ -119,7 +119,7 @@ def test_a_pad_without_a_hole_to_fill_is_refused(here: Path) -> None:
     one = replace(given, nodes=given.nodes[:1], direction=given.direction[:1])
     problem = replace(task.problem, input=one, specification=None)
     write_design(problem.full_design(), here / "slider.json")
-    assert "pad: no hole" in refusal("export", "slider.json", "part.stl", "--pad")
+    assert "pad: there is nothing to fill" in refusal("export", "slider.json", "part.stl", "--pad")
     assert not (here / "part.stl").exists()
 
 

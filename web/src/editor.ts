@@ -324,11 +324,13 @@ export class Editor implements TaskEditor {
     this.building = requested;
     const text = JSON.stringify(this.task.table);
     try {
-      const before = this.built?.lattice;
+      const former = this.built;
+      const before = former?.lattice;
       this.built = await post<Built>("/tasks/build", { task: this.task.table }, requested.signal);
       this.fault = this.built.fault && this.faultOf(this.built.fault);
       const { lattice } = this.built;
       const same = !before || (before.beams.length === lattice.beams.length && JSON.stringify(before.positions) === JSON.stringify(lattice.positions));
+      if (former && !same) this.nameMoved(former, this.built);
       if (this.task.hand && !(same && this.task.hand.length === hexOf(new Uint8Array(lattice.beams.length)).length)) {
         this.history.set({ ...this.task, hand: null }, true);
       }
@@ -342,6 +344,29 @@ export class Editor implements TaskEditor {
     this.reached = null;
     if (this.tool === "hand") this.drawByHand();
     this.show();
+  }
+
+  /** Name the regions whose nodes lie differently beside each other in another lattice, as after a change of size. */
+  private nameMoved(former: Built, now: Built): void {
+    const offsets = ({ lattice: { positions } }: Built, nodes: number[]): number[][] => {
+      const sorted = nodes.map((node) => positions[node]! as number[]).sort((a, b) => a[0]! - b[0]! || a[1]! - b[1]!);
+      return sorted.map((place) => place.map((value, axis) => value - sorted[0]![axis]!));
+    };
+    const names: string[] = [];
+    for (const kind of ["supports", "inputs", "outputs"] as Kind[]) {
+      const cases = kind === "supports" ? [0] : now.regions.cases.map((_, k) => k);
+      for (const k of cases) nodesOf(now, k, kind).forEach((nodes, index) => {
+        const old = nodesOf(former, k, kind)[index];
+        if (!old || old.length < 2) return;
+        // An edge has other nodes in each lattice; nodes that were selected one by one stay as many.
+        const single = sectionsOf(this.task.table, k, kind)[index]?.at?.every((region) => region.point);
+        if (old.length !== nodes.length) { if (single) names.push(`${kind.slice(0, -1)} ${index + 1}`); return; }
+        const [one, two] = [offsets(former, old), offsets(now, nodes)];
+        if (one.some((place, j) => place.some((value, axis) => Math.abs(value - two[j]![axis]!) > 0.1))) names.push(`${kind.slice(0, -1)} ${index + 1}`);
+      });
+    }
+    const text = names.length ? `In the new lattice the nodes lie differently beside each other: ${names.join(", ")}. Check them in the drawing.` : "";
+    if (text) { clear(this.notice, text); announce(text); }
   }
 
   private faultOf({ key, message }: { key: string; message: string }): Fault {
