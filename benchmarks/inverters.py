@@ -41,6 +41,7 @@ from bellcrank.search import SpecificationEvaluator, read_settings
 from bellcrank.task import task_from_dict
 from bellcrank.workflows import complete_design, start_design
 from bellcrank.workflows.refinement import BEFORE_REFINEMENT
+from reproduction.box_elements import Grid
 from reproduction.topology import largest_motion, pymoto
 
 from .record import add_runs
@@ -220,7 +221,7 @@ def optimised(box: Inverter, springs: tuple[float, float]) -> tuple[Values, floa
         vector[3 * int(np.linalg.norm(points - port, axis=1).argmin()) + 2] = sign
     began = time.thread_time()
     smooth, _ = largest_motion(
-        domain, load, output, held, solid, np.zeros(0, np.int64), box.volume,
+        domain, Grid(box.elements, load, output, held, solid, np.zeros(0, np.int64)), box.volume,
         (0.25 * springs[0], 0.25 * springs[1]), box.radius, ITERATIONS,
     )  # fmt: skip
     quarter = smooth[order].reshape(box.elements)

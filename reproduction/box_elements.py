@@ -18,15 +18,16 @@ PAD = 1.7
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Square elements of a box.
+    """Square elements of a box, or cubes.
 
-    Elements and corners are numbered in rows from the bottom, each row from the left; the degrees
-    of freedom of corner ``k`` are ``2 k`` to the right and ``2 k + 1`` upwards.
+    In the plane, elements and corners are numbered in rows from the bottom, each row from the left;
+    the degrees of freedom of corner ``k`` are ``2 k`` to the right and ``2 k + 1`` upwards. In
+    space (`benchmarks.inverters`) the numbers are those of pyMOTO.
 
     Parameters
     ----------
     counts
-        Numbers of elements across and up.
+        Numbers of elements across and up; in space along x, y and z.
     load, output : (n,)
         Unit load at the input, and mean output.
     held : (h,)
@@ -35,7 +36,7 @@ class Grid:
         Numbers of the fixed solid and of the fixed void elements.
     """
 
-    counts: tuple[int, int]
+    counts: tuple[int, ...]
     load: NDArray[np.float64]
     output: NDArray[np.float64]
     held: NDArray[np.int64]

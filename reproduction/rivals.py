@@ -307,8 +307,9 @@ STUDY = register(
                 "removed."
             ),
             (
-                "topoptlab runs as a separate program where the environment variable "
-                "BELLCRANK_TOPOPTLAB is the path of a Python interpreter that has it."
+                "topoptlab takes part, as a separate program, where the environment variable "
+                "BELLCRANK_TOPOPTLAB is the path of a Python interpreter that has it; the table "
+                "names the packages that took part."
             ),
             (
                 "The best result of several settings is reported for each method: springs at input "

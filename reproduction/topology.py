@@ -21,6 +21,7 @@ from reproduction.box_elements import grid_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from reproduction.box_elements import Grid
     from reproduction.boxes import Box
 
 INSTALL = "pip install 'bellcrank[rivals]'"
@@ -91,19 +92,7 @@ def optimise(
     across, up = grid.counts
     domain = pymoto().VoxelDomain(across, up)
     began = time.thread_time()
-    smooth, motion = largest_motion(
-        domain,
-        grid.load,
-        grid.output,
-        grid.held,
-        grid.solid,
-        grid.empty,
-        volume,
-        springs,
-        radius,
-        iterations,
-        off_axis,
-    )
+    smooth, motion = largest_motion(domain, grid, volume, springs, radius, iterations, off_axis)
     output = grid.output
     return {
         "density": smooth.reshape(up, across).round(4).tolist(),
@@ -117,11 +106,7 @@ def optimise(
 
 def largest_motion(
     domain: Any,
-    load: NDArray[np.float64],
-    output: NDArray[np.float64],
-    held: NDArray[np.int64],
-    solid: NDArray[np.int64],
-    empty: NDArray[np.int64],
+    grid: Grid,
     volume: float,
     springs: tuple[float, float],
     radius: float,
@@ -134,27 +119,23 @@ def largest_motion(
     ----------
     domain
         Elements of pyMOTO, in the plane or in space.
-    load, output : (n,)
-        Unit load at the input, and mean output.
-    held : (h,)
-        Fixed degrees of freedom.
-    solid, empty
-        Numbers of the fixed solid and of the fixed void elements.
+    grid
+        The same elements, with load, output and fixed regions.
     volume, springs, radius, iterations, off_axis
         As for `optimise`; `off_axis` in the plane.
     """
-    module = pymoto()
+    module, load, output = pymoto(), grid.load, grid.output
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # its solvers warn at each matrix conversion
         density = module.Signal("x", state=np.full(domain.nel, volume))
         constant = _springs(load, output, springs)
         with module.Network() as network:
-            chosen = module.SetValue(indices=solid, value=1.0)(density)
-            chosen = module.SetValue(indices=empty, value=0.0)(chosen)
+            chosen = module.SetValue(indices=grid.solid, value=1.0)(density)
+            chosen = module.SetValue(indices=grid.empty, value=0.0)(chosen)
             smooth = module.DensityFilter(domain, radius=radius)(chosen)
             stiff = module.MathExpression(f"{LEAST} + {1.0 - LEAST}*inp0^3")(smooth)
             matrix = module.AssembleStiffness(
-                domain, e_modulus=1.0, poisson_ratio=POISSON, plane="stress", bc=held,
+                domain, e_modulus=1.0, poisson_ratio=POISSON, plane="stress", bc=grid.held,
                 add_constant=constant,
             )(stiff)  # fmt: skip
             moved = module.LinSolve(symmetric=True, positive_definite=True)(

@@ -60,24 +60,17 @@ def optimise(
     radius: float,
     iterations: int,
 ) -> dict[str, Any]:
-    """Return densities with a large output displacement.
+    """Return densities with a large output displacement, by the interpreter that is given.
 
-    Parameters and results are those of `reproduction.topology.optimise`, without
-    ``output_over_input``. topoptlab has springs at single degrees of freedom: the stiffness is
-    distributed over the nodes of the input and of the output.
+    Parameters and results are those of `reproduction.topology.optimise`; only density, elements,
+    seconds and springs are returned. topoptlab has springs at single degrees of freedom: the
+    stiffness is distributed over the nodes of the input and of the output.
 
     Raises
     ------
-    InvalidSettings
-        If no interpreter with topoptlab is given.
     BellcrankError
         If topoptlab fails.
     """
-    path = interpreter()
-    if path is None:
-        raise InvalidSettings(
-            f"topoptlab needs {INTERPRETER}, the path of a Python interpreter that has it"
-        )
     grid = grid_of(box, elements)
     freedoms, numbers = _numbering(grid.counts)
     load, output = (_placed(vector, freedoms) for vector in (grid.load, grid.output))
@@ -97,7 +90,7 @@ def optimise(
         "least": LEAST,
         "poisson": POISSON,
     }
-    made = _run(path, job)
+    made = _run(job)
     across, up = grid.counts
     density = np.array(made["density"])[numbers].reshape(up, across)
     return {
@@ -108,28 +101,29 @@ def optimise(
     }
 
 
-def _run(path: str, job: dict[str, Any]) -> dict[str, Any]:
+def _run(job: dict[str, Any]) -> dict[str, Any]:
     with TemporaryDirectory() as folder:
         given, wanted = Path(folder) / "job.json", Path(folder) / "result.json"
         given.write_text(json.dumps(job), encoding="utf-8")
         found = subprocess.run(
-            [path, str(PROGRAM), str(given), str(wanted)],
+            [os.environ[INTERPRETER], str(PROGRAM), str(given), str(wanted)],
             capture_output=True, text=True, check=False, cwd=folder,
         )  # fmt: skip
         if found.returncode:
-            raise BellcrankError(f"topoptlab failed: {found.stderr.strip().splitlines()[-1:]}")
+            raise BellcrankError(f"topoptlab failed: {found.stderr.strip()[-200:]}")
         result: dict[str, Any] = json.loads(wanted.read_text(encoding="utf-8"))
     return result
 
 
-def _numbering(counts: tuple[int, int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _numbering(counts: tuple[int, ...]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the numbers in topoptlab of the degrees of freedom and of the elements of a grid.
 
     topoptlab numbers columns from the left, each from the top.
     """
-    freedoms = _columns(counts[0] + 1, counts[1] + 1)
-    pairs = np.column_stack([2 * freedoms, 2 * freedoms + 1]).ravel()
-    return pairs, _columns(*counts)
+    across, up = counts
+    corners = _columns(across + 1, up + 1)
+    freedoms = np.column_stack([2 * corners, 2 * corners + 1]).ravel()
+    return freedoms, _columns(across, up)
 
 
 def _columns(across: int, up: int) -> NDArray[np.int64]:

@@ -8,43 +8,42 @@ The bundled network is such a mean (docs/surrogate.md).
 from __future__ import annotations
 
 import argparse
-import json
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-from safetensors import safe_open
-from safetensors.numpy import load_file, save_file
+from bellcrank.surrogate.trained_model import read_model
 
-KEY = "bellcrank"
-"""Key of the description in the file of a network."""
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
-
-def read_description(network: Path) -> dict[str, Any]:
-    """Return the description of a network: architecture, picture, record of its training."""
-    with safe_open(network, "numpy") as file:
-        found: dict[str, Any] = json.loads(file.metadata()[KEY])
-    return found
+    from bellcrank.surrogate.trained_model import TrainedModel
 
 
-def write_mean(networks: list[Path], out: Path) -> None:
-    """Write the mean of the weights of networks with equal names and shapes.
+def mean_of(models: Sequence[TrainedModel]) -> TrainedModel:
+    """Return the mean of the weights of networks that were trained on from the same one.
 
-    The description is that of the last network, with the records of the others in ``mean_of``.
+    Its record is that of the last network, with the records of the others in ``mean_of``.
+
+    Raises
+    ------
+    ValueError
+        If the networks have other inputs, outputs or weights.
     """
-    weights = [load_file(network) for network in networks]
-    *others, description = [read_description(network) for network in networks]
-    description["record"]["mean_of"] = [each["record"] for each in others]
-    shapes = [{name: array.shape for name, array in each.items()} for each in weights]
-    if any(each != shapes[0] for each in shapes):
-        raise ValueError("networks of different shapes")
-    mean = {
-        name: np.asarray(
-            np.mean([np.asarray(each[name], dtype=np.float64) for each in weights], axis=0)
-        ).astype(array.dtype)
-        for name, array in weights[-1].items()
-    }
-    save_file(mean, out, metadata={KEY: json.dumps(description)})
+    import torch
+
+    *others, last = models
+    kinds = [{**each.describe(), "record": None} for each in models]
+    if any(kind != kinds[-1] for kind in kinds):
+        raise ValueError("expected networks of one architecture, problem, picture and scale")
+    weights = [each.network.state_dict() for each in models]
+    last.network.load_state_dict(
+        {
+            name: torch.stack([each[name].double() for each in weights]).mean(0).to(value.dtype)
+            for name, value in weights[-1].items()
+        }
+    )
+    return replace(last, record={**last.record, "mean_of": [each.record for each in others]})
 
 
 if __name__ == "__main__":
@@ -52,4 +51,4 @@ if __name__ == "__main__":
     parser.add_argument("networks", nargs="+", type=Path)
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
-    write_mean(given.networks, given.out)
+    mean_of([read_model(network) for network in given.networks]).write(given.out)

@@ -66,7 +66,7 @@ import json, sys
 job = json.load(open(sys.argv[1]))
 across, down = job["elements"]
 density = [0.001 * (k + 1) for k in range(across * down)]
-json.dump({"density": density, "seconds": 1.0, "job": job}, open(sys.argv[2], "w"))
+json.dump({"density": density, "seconds": 1.0}, open(sys.argv[2], "w"))
 json.dump(job, open("KEPT", "w"))
 """
 """A program in place of topoptlab: densities that increase with the number of the element."""
@@ -79,7 +79,7 @@ def test_a_separate_program_gets_and_gives_elements_in_its_own_numbering(
     program = tmp_path / "program.py"
     program.write_text(STAND_IN.replace("KEPT", str(kept)))
     monkeypatch.setattr(topoptlab_peer, "PROGRAM", program)
-    monkeypatch.setattr(topoptlab_peer, "interpreter", lambda: sys.executable)
+    monkeypatch.setenv(topoptlab_peer.INTERPRETER, sys.executable)
     box = box_of("inverter", 6, 7, 0.2, 0.01)
     made = topoptlab_peer.optimise(box, 40, 0.4, (0.1, 0.01), 2.0, 5)
     density, (across, up) = np.array(made["density"]), made["elements"]

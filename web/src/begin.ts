@@ -82,7 +82,7 @@ export function openTask(task: Task): void {
   store(task, { past: before ? [...history.past, before] : history.past, future: [] });
 }
 
-/** Settings of the latest search of this tab. */
+/** Settings of the latest search of this tab, else of any. */
 export function storedSettings(): Settings {
   try {
     return { ...SETTINGS, ...JSON.parse(sessionStorage.getItem(SETTINGS_KEY) ?? localStorage.getItem(SETTINGS_KEY) ?? "{}") as Partial<Settings>, fromHand: false };

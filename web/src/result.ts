@@ -141,11 +141,12 @@ export class Result {
   private async follow(): Promise<void> {
     if (this.following) return;
     this.following = true;
-    const { known } = this;
-    const isRunning = (): boolean => known.tolerance === "running" || Object.values(known.fems).includes("running");
-    while (isRunning() && !this.closed && known === this.known) {
+    // The part may be changed meanwhile.
+    const isRunning = (): boolean => this.known.tolerance === "running" || Object.values(this.known.fems).includes("running");
+    while (isRunning() && !this.closed) {
       await new Promise((resolve) => { setTimeout(resolve, SHARE_PERIOD); });
       if (!isRunning() || this.closed) break;
+      const { known } = this;
       const found = await this.askComputations(false);
       const shareOf = (each: Computation<unknown> | undefined): number | null => each && "share" in each ? each.share : null;
       known.shares = { tolerance: shareOf(found?.tolerance), ...Object.fromEntries(Object.entries(found?.validation ?? {}).map(([level, each]) => [level, shareOf(each)])) };
@@ -155,10 +156,10 @@ export class Result {
     this.following = false;
   }
 
-  /** How much of a computation is done, after "computing". */
+  /** How much of a computation is done, at the end of a text that says that it runs. */
   private shareText(name: string): string {
     const share = this.known.shares[name];
-    return share == null ? "computing …" : `computing, ${Math.round(100 * share)} % …`;
+    return share == null ? " …" : `, ${Math.round(100 * share)} % …`;
   }
 
   /** The model of the printed body. */
@@ -218,7 +219,7 @@ export class Result {
     const unstable = !first || first.efficiency === undefined || (report.specified && !report.items.frames);
     const isMet = last !== null && columns.every(({ items }) => items.every(({ met }) => met)) && !unstable;
     this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? (solid?.items ? "met" : "met pending") : "missed"}`;
-    const pending = found === "running" ? `; ${words}, is ${this.shareText(level).replace("computing", "being computed")}` : !solid ? `; not checked in ${words}` : !solid.items ? `; not stable in ${words}` : "";
+    const pending = found === "running" ? `; ${words}, is being computed${this.shareText(level)}` : !solid ? `; not checked in ${words}` : !solid.items ? `; not stable in ${words}` : "";
     const by = solid?.items ? ` by frames and in ${words}` : " by frames";
     clear(this.verdict, unstable ? "The part snaps or collapses before the full stroke, by frames with 8 elements in each strut."
       : last ? `${verdictOf(last)}${isMet || !solid?.items ? by : ` in ${words}`}${pending}.${this.printedText()}` : "No specification: the task says nothing about straightness, rotation or load.");
@@ -260,7 +261,7 @@ export class Result {
     if (known === undefined) {
       return h("tr", {}, heading, h("td", { colspan: 2 }, button("Check with finite elements", () => void this.validate(name), "quiet small", { "aria-label": `Check with finite elements: ${title}` }), h("span", { class: "more" }, ` ${duration}`)));
     }
-    if (known === "running") return h("tr", {}, heading, h("td", { colspan: 2, class: "more" }, h("span", { class: "working" }), this.shareText(name)));
+    if (known === "running") return h("tr", {}, heading, h("td", { colspan: 2, class: "more" }, h("span", { class: "working" }), `computing${this.shareText(name)}`));
     if (typeof known === "string") return h("tr", {}, heading, h("td", { colspan: 2, class: "fault" }, known));
     const stress = known.von_mises_MPa === null ? "" : `${figure(known.von_mises_MPa, 2)} MPa, ${figure(100 * (known.principal_strain ?? 0), 0)} % strain`;
     // Warnings of the frame are shown below the headline.
@@ -310,7 +311,7 @@ export class Result {
         button("Compute the tolerance", () => void this.computeTolerance(), "", { "data-key": "tolerance" }), h("span", { class: "more" }, " ten seconds to a minute"));
       return;
     }
-    if (tolerance === "running") { clear(this.toleranceBox, h("p", { class: "more" }, h("span", { class: "working" }), this.shareText("tolerance"))); return; }
+    if (tolerance === "running") { clear(this.toleranceBox, h("p", { class: "more" }, h("span", { class: "working" }), `computing${this.shareText("tolerance")}`)); return; }
     if (typeof tolerance === "string") { clear(this.toleranceBox, h("p", { class: "fault", role: "alert" }, tolerance)); return; }
     const [head, ...rows] = tolerance.rows;
     // The narrow panel shows first what counts most.

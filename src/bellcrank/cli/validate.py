@@ -50,7 +50,7 @@ class StrokeProgress(Live):
     Parameters
     ----------
     names
-        Names of the analyses; the last one is that of the items of the specification.
+        Names of the analyses, and of the items of a specification if they are computed.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -125,6 +125,7 @@ def validate(
         without_missing_levels,
     )
     from bellcrank.workflows.pictures import check_targets, draw_validations, write_vtu
+    from bellcrank.workflows.validation import has_items
 
     check_targets(picture, vtu, overwrite=overwrite)
     target = record or record_of(design)
@@ -149,9 +150,9 @@ def validate(
     ]
     validations = []
     names = [f"{name} {_model(name, settings)}" for name, settings in plan]
-    names.append("items of the specification")
     for one, save in zip(strokes, savers, strict=False):
-        with StrokeProgress(names) as progress:
+        last = ["items of the specification"] if has_items(one, spec) else []
+        with StrokeProgress([*names, *last]) as progress:
             validations.append(validate(one, spec, plan, progress, save))
     validation = validations[0]
     if as_json:

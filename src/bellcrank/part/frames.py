@@ -58,13 +58,14 @@ def frame_problem(problem: Problem, spec: PartSpec) -> Problem:
     """
     _check_slender(problem, spec)
     section = frame_section(spec, problem.lattice.dimension)
-    material = frame_elasticity(problem.lattice, section, spec, problem.stiffness)
     widths, joints = problem.widths, problem.joints
-    if problem.section is not None:
+    if problem.section is None:
+        material = frame_elasticity(problem.lattice, section, spec, problem.stiffness)
+    else:
         assert problem.material is not None
         # Loads and bounds are in units of the stiffness of the beams, which has to stay.
         young = problem.material.young * problem.section.area / section.area
-        material = replace(material, young=young)
+        material = Elasticity(young, spec.registered_material.poisson)
         ratio = section.width / problem.section.width
         widths = None if widths is None else widths * ratio
         joints = joints * ratio if joints is not None and spec.keeps_joints(problem) else None

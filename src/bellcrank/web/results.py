@@ -118,6 +118,7 @@ class StoredResults:
             return found
         share = self._path(key, "share")
         self._folder.mkdir(parents=True, exist_ok=True)
+        share.unlink(missing_ok=True)  # that of a server that was killed
         try:
             found = await compute(share)
         finally:

@@ -279,11 +279,12 @@ def validation(
     from bellcrank.fem import FemSettings
     from bellcrank.part import PartSpec
     from bellcrank.workflows import validate
+    from bellcrank.workflows.validation import has_items
 
     spec, design = PartSpec.from_dict(part), design_of(text, mask)
     # The specification is that of the part that is shown.
     design = replace(design, provenance={"part": part})
-    stages, write = 1 + design.problem.is_specified, ShareFile(share)
+    stages, write = 1 + has_items(design, spec), ShareFile(share)
     validation = validate(
         design, spec, [(level, FemSettings())], lambda index, done: write((index + done) / stages)
     )

@@ -80,7 +80,7 @@ class Validation:
     @property
     def has_items(self) -> bool:
         """Whether items are computed after the analyses."""
-        return self.design.problem.is_specified and self.spec == spec_for(self.design)
+        return has_items(self.design, self.spec)
 
     @property
     def doubts(self) -> list[str]:
@@ -132,6 +132,11 @@ class Validation:
             "results": results,
             "provenance": provenance(),
         }
+
+
+def has_items(design: Design, spec: PartSpec) -> bool:
+    """Return whether a design has a specification, which is for this part."""
+    return design.problem.is_specified and spec == spec_for(design)
 
 
 def with_specification(
