@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 SESSIONS, SEARCHES = 20, 8
+SPACE = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""Options of Chromium with which it draws a view in space without a graphics processor; pages in
+the plane are slower with them."""
 START_LIMIT = 120.0
 """Longest time until all searches have started, in seconds."""
 RARELY = 5
@@ -213,9 +216,7 @@ def in_browser(address: str) -> None:
             page.wait_for_timeout(500)
         struts = page.locator(".step.domain .summary").inner_text().split(", ")[1]
         print(f"click to moved lattice, {struts:12s}{quantiles(clicks(page))}")
-        page.goto(f"{address}/#/design/builtin/machine-crane")
-        page.locator('.player[data-ready="yes"]').wait_for()
-        page.wait_for_timeout(500)
+        open_crane(page, address)
         session = page.context.new_cdp_session(page)
         session.send("Performance.enable", {"timeDomain": "threadTicks"})
         before = thread_time(session)
@@ -224,6 +225,30 @@ def in_browser(address: str) -> None:
         print(f"animation of the crane              {rate:.0f} frames per second")
         print(f"time per frame of the page's thread {frame_time:.1f} ms")
         browser.close()
+        in_space(playwright.chromium.launch(executable_path=chromium, args=SPACE), address)
+
+
+def in_space(browser: Any, address: str) -> None:
+    """Measure the view in space of the crane, which is extruded."""
+    page = browser.new_page(viewport={"width": 1440, "height": 900})
+    open_crane(page, address)
+    received = []
+    page.on("response", lambda found: received.append(found.headers.get("content-length", 0)))
+    page.locator(".transport label", has_text="3D").click()
+    page.locator("canvas").wait_for()
+    page.wait_for_timeout(2000)
+    print(f"size of the view in space           {sum(map(int, received)) / 1000:.0f} kB more")
+    print(
+        f"animation in space, no GPU          {page.evaluate(COUNT_FRAMES)[1]:.0f} frames per second"
+    )
+    browser.close()
+
+
+def open_crane(page: Any, address: str) -> None:
+    """Open a design, and wait until it moves."""
+    page.goto(f"{address}/#/design/builtin/machine-crane")
+    page.locator('.player[data-ready="yes"]').wait_for()
+    page.wait_for_timeout(500)
 
 
 def clicks(page: Any) -> list[float]:
