@@ -238,9 +238,8 @@ def in_space(browser: Any, address: str) -> None:
     page.locator("canvas").wait_for()
     page.wait_for_timeout(2000)
     print(f"size of the view in space           {sum(map(int, received)) / 1000:.0f} kB more")
-    print(
-        f"animation in space, no GPU          {page.evaluate(COUNT_FRAMES)[1]:.0f} frames per second"
-    )
+    rate = page.evaluate(COUNT_FRAMES)[1]
+    print(f"animation in space, no GPU          {rate:.0f} frames per second")
     browser.close()
 
 
