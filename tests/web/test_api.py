@@ -16,6 +16,7 @@ from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator
 from bellcrank.model import find_problem, human_design, problem_to_dict
 from bellcrank.part import materials
 from bellcrank.search import DEFAULT_SEARCH, searches
+from bellcrank.web import design_routes
 from bellcrank.web.page_files import page_files
 
 if TYPE_CHECKING:
@@ -231,7 +232,7 @@ def test_frames_say_how_the_part_moves(client: TestClient, crane: dict[str, Any]
 
 
 def test_a_check_is_found_again_without_computing_it(
-    client: TestClient, crane: dict[str, Any]
+    client: TestClient, crane: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     part = {"width": 1.7}
     body = {"problem": crane["problem"], "mask": crane["mask"], "part": part}
@@ -244,6 +245,9 @@ def test_a_check_is_found_again_without_computing_it(
     assert after["validation"]["plane"] is None
     running = client.post("/api/computations", json={**body, "results": False}).json()
     assert running["validation"]["frame"] is None
+    monkeypatch.setattr(design_routes, "CODE", ["0.1.0", "another commit"])
+    other = client.post("/api/computations", json=body).json()
+    assert other["validation"]["frame"] is None
 
 
 def test_a_design_by_hand_is_kept_and_found_in_the_gallery(

@@ -319,8 +319,9 @@ export class Result {
     const place = (name: string): number => (order.includes(name) ? order.indexOf(name) : order.length);
     const shown = head!.map((name, k) => ({ name, k })).filter(({ name }) => name !== "wanted").sort((a, b) => place(a.name) - place(b.name));
     clear(this.toleranceBox, h("p", {}, sentence(tolerance.sentence)),
+      h("p", { class: "note" }, "Yield: the part of the random prints that meet an item; 95 %: the value that 95 of 100 prints reach. Then the worst values for widths 20 % narrower to 10 % wider, input directions 5° off, half and one and a half strokes, and of the prints."),
       h("div", { class: "report", tabindex: 0, role: "region", "aria-label": "Tolerance" },
-        h("table", { class: "items tolerance" }, h("caption", {}, "As drawn; part of the random prints that meet the item, and the value that 95 % of them reach; the worst for other widths (20 % narrower to 10 % wider), input directions (5°), strokes (half and one and a half), and of the prints"),
+        h("table", { class: "items tolerance" }, h("caption", {}, "Values as drawn, and in the scenarios"),
           h("thead", {}, h("tr", {}, ...shown.map(({ name }) => h("th", { scope: "col" }, name)))),
           h("tbody", {}, ...rows.map((row) => h("tr", {}, ...shown.map(({ k }) => (k === 0 ? h("th", { scope: "row" }, row[k]!, h("small", {}, row[1]!)) : h("td", {}, row[k]!)))))))),
       this.lossText(tolerance.losses));

@@ -10,10 +10,10 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from fastapi.responses import Response
 from starlette.concurrency import run_in_threadpool
 
-from bellcrank import __version__
 from bellcrank.errors import BellcrankError, InvalidFile
 from bellcrank.fem import levels
 from bellcrank.model import Design, unpack_mask
+from bellcrank.provenance import provenance
 from bellcrank.web import quick_calls, slow_calls
 from bellcrank.web.errors import plain_error
 from bellcrank.web.gallery import design_data, entry_named
@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from bellcrank.web.state import AppState
 
 router = APIRouter(prefix="/api", tags=["designs"])
+CODE = [provenance()[key] for key in ("version", "commit")]
+"""The code that computes: stored results of another one are not used."""
 WITH_SHARE = (slow_calls.validation, slow_calls.tolerance)
 """Slow computations that write the fraction that is done."""
 
@@ -60,7 +62,7 @@ async def _computed(
 
 def _slow_key(function: Callable[..., dict[str, Any]], body: PartBody, *more: Any) -> str:
     """Return the text that the result of a slow computation follows from."""
-    data = [__version__, function.__name__, body.problem, body.mask, body.part, *more]
+    data = [*CODE, function.__name__, body.problem, body.mask, body.part, *more]
     return json.dumps(data, sort_keys=True)
 
 
