@@ -180,8 +180,7 @@ def test_a_refined_part_stays_inside_its_domain_in_space() -> None:
     assert outside[False] > 0.05
 
 
-def test_ends_that_keep_their_positions_have_no_constraint() -> None:
-    """Wide struts at the boundary are outside; at held nodes this is not a constraint."""
+def test_struts_at_held_ends_on_the_boundary_are_not_wider_than_the_section() -> None:
     task = find_task("lever")
     assert task is not None
     problem = task.problem
@@ -194,8 +193,10 @@ def test_ends_that_keep_their_positions_have_no_constraint() -> None:
         for key, name, value in zip(rows.keys, rows.names, rows.values, strict=True)
         if name == "domain" and key[1] in {0, 4}
     ]
-    assert max(value for _, value in at_ends) > 0.1
-    assert not np.isin([node for node, _ in at_ends], problem.special_nodes_of_all_cases).any()
+    held = problem.special_nodes_of_all_cases
+    at_held_ends = [value for node, value in at_ends if node in held]
+    assert max(at_held_ends) == pytest.approx(0.5 - 0.5 / 1.5)
+    assert max(value for _, value in at_ends) == pytest.approx(0.5 - 0.5 / 1.5)
 
 
 def test_rings_have_three_points() -> None:

@@ -54,6 +54,7 @@ export interface PartFigures {
   travel_mm?: number | null;
   off_axis?: number | null;
   rotation_deg?: number | null;
+  output_deformation_mm?: number | null;
   payload_N?: number | null;
   dead_load_N?: number | null;
   sag_mm?: number | null;
@@ -66,6 +67,8 @@ export interface PartReport {
   specified: boolean;
   items: { search: ItemState[] | null; frames: ItemState[] | null };
   objectives: Objective[];
+  /** Inputs and loads in words. */
+  conditions: string[];
   figures: PartFigures[];
 }
 

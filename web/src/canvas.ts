@@ -64,10 +64,10 @@ export class Canvas extends Drawing implements TaskDrawing {
     const changed = before !== lattice && (JSON.stringify(before?.positions) !== JSON.stringify(lattice.positions) || before?.beams.length !== lattice.beams.length);
     this.view_ = view;
     if (changed) {
-      this.setLattice(lattice.positions, lattice.beams, 1.4);
+      this.setLattice(lattice.positions, lattice.beams, 2.1);
       this.cursor = -1;
     }
-    this.dimensions(view.built.part.scale);
+    this.dimensions(view.built.part.scale, view.arrows.filter(({ nodes }) => nodes.length).map((each) => this.tip(each)));
     this.at = this.rest;
     const { bits, designable } = view;
     this.ghost("possible", bits ? where(bits, 0) : []);

@@ -19,7 +19,7 @@ const USUAL: Record<QuantityName, Usual> = {
   travel: { title: "travel, mm", bound: "at_least", example: "5 mm", about: "Motion of the output along its direction." },
   off_axis: { title: "off-axis motion", bound: "at_most", example: "10%", about: "Largest motion normal to the direction, over the travel." },
   rotation: { title: "rotation", bound: "value", example: "5 deg", about: "Rotation of the output, counter-clockwise positive." },
-  payload: { title: "payload", bound: "at_least", example: "10 g", about: "Load against the direction of the output that grows with the input, as that of a workpiece, and halves the travel." },
+  payload: { title: "payload", bound: "at_least", example: "10 g", about: "Load against the direction of the output that grows with the input, as that of a workpiece, and halves the travel. With a force of the tool Loads all items hold under it." },
   dead_load: { title: "dead load", bound: "at_least", example: "10 g", about: "Weight against the direction of the output that acts before the input, and halves the travel." },
   stiffness: { title: "stiffness", bound: "at_least", example: "0.1 N/mm", about: "Stiffness of the output along its direction at the full stroke." },
   blocked_force: { title: "blocked force", bound: "at_least", example: "0.1 N", about: "Force of the output on a stop that prevents its travel." },

@@ -17,6 +17,7 @@ export class Chart {
   /** Size of a unit of the curves in the unit of the axis, such as mm. */
   unit = 1;
   private level: { title: string; value: number } | null = null;
+  private refined: number | null = null;
   private steps = 1;
   private shaded = true;
   private cold = 0;
@@ -32,6 +33,13 @@ export class Chart {
 
   compare(title: string, value: number | null): void {
     this.level = value === null ? null : { title, value };
+    this.draw();
+  }
+
+  /** Set the largest objective of the refinement, in the unit of the curves. */
+  setRefined(objective: number): void {
+    if (objective === this.refined) return;
+    this.refined = objective;
     this.draw();
   }
 
@@ -68,7 +76,8 @@ export class Chart {
         if (top !== null && top > best) { best = top; bestChain = chain; }
       }
     }
-    if (this.level) { high = Math.max(high, this.level.value); low = Math.min(low, this.level.value); }
+    const levels = [...(this.level ? [this.level] : []), ...(this.refined === null ? [] : [{ title: "refined", value: this.refined * this.unit }])];
+    for (const { value } of levels) { high = Math.max(high, value); low = Math.min(low, value); }
     const ticks = ladder(low, high);
     const step = ticks[1]! - ticks[0]!;
     const digits = step >= 1 ? 0 : step >= 0.1 ? 1 : 2;
@@ -87,10 +96,10 @@ export class Chart {
       parts.push(s("text", { class: "tick", x: x(at), y: H - 8, "text-anchor": part === 1 ? "end" : part ? "middle" : "start" },
         part === 1 ? `${at.toLocaleString("en")} steps` : at.toLocaleString("en")));
     }
-    if (this.level) {
-      const at = y(this.level.value);
+    for (const { title, value } of levels) {
+      const at = y(value);
       parts.push(s("path", { class: "level", d: `M${PAD.left} ${at}H${W - PAD.right}` }),
-        s("text", { class: "level-name", x: W - PAD.right, y: at - 5, "text-anchor": "end" }, `${this.level.title} ${figure(this.level.value)}`));
+        s("text", { class: "level-name", x: W - PAD.right, y: at - 5, "text-anchor": "end" }, `${title} ${figure(value)}`));
     }
     const order = [...this.curves.keys()].sort((a, b) => Number(a === bestChain) - Number(b === bestChain));
     for (const chain of order) {

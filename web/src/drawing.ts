@@ -110,19 +110,24 @@ export class Drawing implements LatticeDrawing {
     thicken(this.svg, view.w);
   }
 
-  /** Write width and height of the lattice at rest beside it; `scale` is the length of a unit in mm. */
-  dimensions(scale: number): void {
+  /**
+   * Write width and height of the lattice at rest beside it, below and on the right, or on the other
+   * side where there are marks; `scale` is the length of a unit in mm.
+   */
+  dimensions(scale: number, marks: Point[] = []): void {
     if (!this.dims.parentNode) this.under.append(this.dims);
     const [x0, x1] = [least(this.rest, 0), most(this.rest, 0)];
     const [y0, y1] = [-least(this.rest, 1), -most(this.rest, 1)];
     const text = (length: number): string => `${(length * scale).toFixed(length * scale < 100 ? 1 : 0).replace(/\.0$/, "")} mm`;
-    const [below, right] = [y0 + 0.85, x1 + 0.85];
+    const isFree = (isOutside: (x: number, y: number) => boolean): boolean => !marks.some(([x, y]) => isOutside(x, -y));
+    const row = isFree((_, y) => y > y0 + 0.3) || !isFree((_, y) => y < y1 - 0.3) ? y0 + 0.85 : y1 - 0.85;
+    const column = isFree((x) => x > x1 + 0.3) || !isFree((x) => x < x0 - 0.3) ? x1 + 0.85 : x0 - 0.85;
     const size = 0.028 * Math.max(this.view.h, this.view.w / 1.5);
     this.dims.style.fontSize = `${size.toFixed(3)}px`;
     this.dims.replaceChildren(
-      s("path", { d: `M${x0} ${below}H${x1}M${x0} ${below - 0.15}v0.3M${x1} ${below - 0.15}v0.3M${right} ${y0}V${y1}M${right - 0.15} ${y0}h0.3M${right - 0.15} ${y1}h0.3` }),
-      s("text", { x: (x0 + x1) / 2, y: below + size / 3, "text-anchor": "middle" }, text(x1 - x0)),
-      s("text", { x: right, y: (y0 + y1) / 2, "text-anchor": "middle", transform: `rotate(-90 ${right} ${(y0 + y1) / 2}) translate(0 ${(size / 3).toFixed(3)})` }, text(y0 - y1)));
+      s("path", { d: `M${x0} ${row}H${x1}M${x0} ${row - 0.15}v0.3M${x1} ${row - 0.15}v0.3M${column} ${y0}V${y1}M${column - 0.15} ${y0}h0.3M${column - 0.15} ${y1}h0.3` }),
+      s("text", { x: (x0 + x1) / 2, y: row + size / 3, "text-anchor": "middle" }, text(x1 - x0)),
+      s("text", { x: column, y: (y0 + y1) / 2, "text-anchor": "middle", transform: `rotate(-90 ${column} ${(y0 + y1) / 2}) translate(0 ${(size / 3).toFixed(3)})` }, text(y0 - y1)));
   }
 
   trace(paths: number[][][]): void {

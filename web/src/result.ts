@@ -39,6 +39,9 @@ const SPACE_BODY = { level: "solid", title: "3D solid", words: "the 3D solid, th
 /** Time between two questions after what is computed, milliseconds. */
 const SHARE_PERIOD = 2000;
 
+/** Part of the random prints that meet all items, below which a verdict is not green. */
+const LOW_YIELD = 0.9;
+
 /** Effort of a search that begins with a design. */
 const CONTINUED = { steps: 8000, chains: 2 };
 
@@ -218,20 +221,28 @@ export class Result {
     const last = columns.at(-1)?.items ?? null;
     const unstable = !first || first.efficiency === undefined || (report.specified && !report.items.frames);
     const isMet = last !== null && columns.every(({ items }) => items.every(({ met }) => met)) && !unstable;
-    this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? (solid?.items ? "met" : "met pending") : "missed"}`;
+    const isSure = solid?.items && !this.hasLowYield;
+    this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? (isSure ? "met" : "met pending") : "missed"}`;
     const pending = found === "running" ? `; ${words}, is being computed${this.shareText(level)}` : !solid ? `; not checked in ${words}` : !solid.items ? `; not stable in ${words}` : "";
     const by = solid?.items ? ` by frames and in ${words}` : " by frames";
     clear(this.verdict, unstable ? "The part snaps or collapses before the full stroke, by frames with 8 elements in each strut."
-      : last ? `${verdictOf(last)}${isMet || !solid?.items ? by : ` in ${words}`}${pending}.${this.printedText()}` : "No specification: the task says nothing about straightness, rotation or load.");
+      : last ? `${verdictOf(last)}${isMet || !solid?.items ? by : ` in ${words}`}${pending}${found === "running" ? "" : "."}${this.printedText()}` : "No specification: the task says nothing about straightness, rotation or load.");
     const models: [string, PartFigures[]][] = [["frames", report.figures]];
     if (solid?.figures) models.push([title, solid.figures]);
-    clear(this.reportBox, columns.length > 0 && itemTable(columns), figureTable(figureColumns(models)));
+    const conditions = columns.length > 0 && h("p", { class: "note" }, `Items with ${report.conditions.join("; ")}.`);
+    clear(this.reportBox, columns.length > 0 && itemTable(columns), conditions, figureTable(figureColumns(models)));
     const better = this.subject.comparison?.efficiency ?? null;
     const defect = unstable ? "The part has no stable path to the full stroke."
       : last && !isMet ? "The specification is not met."
       : !last && (first.efficiency ?? 0) <= 0 ? "The output does not move in its direction."
       : better !== null && this.subject.efficiency !== null && better > this.subject.efficiency ? "The design drawn by hand has a higher efficiency." : "";
     clear(this.advice, defect && h("p", {}, defect), defect && h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text))));
+  }
+
+  /** Whether more than one in ten random prints miss an item. */
+  private get hasLowYield(): boolean {
+    const { tolerance } = this.known;
+    return tolerance !== null && typeof tolerance === "object" && tolerance.met < LOW_YIELD * tolerance.prints;
   }
 
   /** How many random prints meet all items, if the tolerance is known. */
@@ -369,7 +380,7 @@ export class Result {
     const task = (this.subject.task ?? this.subject.provenance["task"]) as Table | null | undefined;
     const domain = task?.domain?.size;
     if (!domain || !domain.some((length, axis) => typeof length === "number" && size[axis]! > length + 0.05)) return "";
-    return `Larger than the domain of ${domain.join(" × ")} mm: the refinement moves nodes, and struts are wider than a line. State a smaller domain if the part has to fit.`;
+    return `Larger than the domain of ${domain.join(" × ")} mm.`;
   }
 
   /** The printing time, which the slicer takes some seconds to estimate. */

@@ -47,7 +47,7 @@ export class RunPage {
     if (run.comparison) this.chart.compare(run.comparison.title, run.comparison.efficiency);
     this.stage.append(this.switcher, this.paper);
     const card = h("section", { class: "card", "aria-label": "Progress of the search" }, this.curveTitle, this.chart.svg, this.curveNote);
-    this.curveTitle.textContent = run.problem.specification ? "Objective along the search" : "Efficiency along the search";
+    this.curveTitle.textContent = run.problem.specification ? "Objective along the search, before refinement" : "Efficiency along the search";
     card.hidden = run.refine;
     this.watch = h("aside", { class: "panel", "aria-label": "Search" },
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Search"), this.live, this.items, this.controls, this.trouble));
@@ -85,6 +85,7 @@ export class RunPage {
     this.update = { ...update, moved: update.moved ?? this.update?.moved ?? null };
     this.run = { ...this.run, ...update.run };
     this.chart.unit = this.unit;
+    if (update.refined?.objective != null) this.chart.setRefined(update.refined.objective);
     if (Object.keys(update.points).length || update.reset) this.chart.add(update.points, update.reset);
     this.show(this.run);
     if (!this.result) this.drawLive();
@@ -191,7 +192,7 @@ export class RunPage {
     const specified = Boolean(this.run.problem.specification);
     const tried = this.update?.tried;
     const refined = this.update?.refined;
-    const refining = refined && `${count(refined.designs, "design")}, ${count(refined.geometries, "geometry", "geometries")}${refined.sheets ? `, ${count(refined.sheets, "check")} in the better model` : ""}${refined.objective === null ? "" : `, best ${figure(refined.objective * this.unit, 2)}`}`;
+    const refining = refined && `${count(refined.designs, "design")}, ${count(refined.geometries, "geometry", "geometries")}${refined.sheets ? `, ${count(refined.sheets, "check")} in the better model` : ""}`;
     const phase = refined ? "refinement" : tried ? "verification" : "search";
     const phases = ["search", "verification", ...(specified ? ["refinement"] : [])];
     const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${done.toLocaleString("en")} geometries`)]] : [
@@ -220,8 +221,8 @@ export class RunPage {
       const moved = this.update?.moved;
       const objective = otherObjective(moved?.objectives ?? []);
       const value = moved?.efficiency ?? run.efficiency ?? this.chart.best;
-      if (objective) this.curveTitle.textContent = `Objective along the search: ${objective.label}${this.unit === 1 ? "" : ", mm"}`;
-      else if (moved?.objectives.length) this.curveTitle.textContent = `Objective along the search: ${moved.objectives[0]!.label}`;
+      if (objective) this.curveTitle.textContent = `Objective along the search, before refinement: ${objective.label}${this.unit === 1 ? "" : ", mm"}`;
+      else if (moved?.objectives.length) this.curveTitle.textContent = `Objective along the search, before refinement: ${moved.objectives[0]!.label}`;
       clear(this.readout, value !== null && h("strong", {}, objective?.reached ?? figure(value, 3)),
         h("span", {}, `${objective ? `${objective.label} of the ` : ""}${this.stateText(run, value !== null, done)}`));
     }

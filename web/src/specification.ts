@@ -60,6 +60,7 @@ export function figureTable(columns: FigureColumn[]): HTMLElement {
     ["motion of the output", (row) => unit(row.travel_mm, 2, "mm")],
     ["off-axis motion", (row) => (row.off_axis == null ? "–" : `${figure(100 * row.off_axis, 1)}\u00a0%${row.travel_mm == null ? "" : ` (${figure(row.off_axis * Math.abs(row.travel_mm), 2)}\u00a0mm)`}`)],
     ["rotation of the output", (row) => unit(row.rotation_deg, 1, "°")],
+    ["deformation of the output", (row) => unit(row.output_deformation_mm, 2, "mm"), "of its nodes from a rigid motion"],
     ["payload that halves the motion", (row) => weight(row.payload_N), "a load that grows with the input"],
     ["dead load that halves the motion", (row) => weight(row.dead_load_N), "a weight that acts before the input"],
     ["sag under own weight", (row) => unit(row.sag_mm, 2, "mm")],

@@ -29,6 +29,15 @@ def _warn_of_second_model(report: DesignReport) -> None:
     notes.print(f"[bold yellow]warning:[/] {where} the design {text}")
 
 
+def _print_conditions(report: DesignReport) -> None:
+    """Print the inputs and loads with which the items of a specification hold."""
+    from bellcrank.workflows.condition_texts import condition_texts
+
+    if report.items and report.part is not None:
+        conditions = condition_texts(report.selection.design.problem, report.part)
+        results.print(plain(f"items with {'; '.join(conditions)}:"))
+
+
 def print_report(report: DesignReport) -> None:
     """Print the results in a table, with warnings."""
     from bellcrank.workflows.refinement import refinement_text
@@ -41,6 +50,7 @@ def print_report(report: DesignReport) -> None:
     from bellcrank.workflows.tolerance import tolerance_rows, tolerance_sentence
 
     selection = report.selection
+    _print_conditions(report)
     table = Table.grid(padding=(0, 2))
     shown = [item_table(report), nearest_table(report), figure_table(report)]
     for rows in (*shown, part_figure_table(report)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -136,6 +137,41 @@ def best_fit_rotation(
     if len(positions) < 2:
         return np.full(() if dimension == 2 else (3,), np.nan)
     return rotation_of(turned_positions(positions, displacement))
+
+
+def deformation_of(positions: NDArray[np.float64], displacement: NDArray[np.float64]) -> float:
+    """Return the largest distance of displaced nodes from their best-fit rigid motion.
+
+    Parameters
+    ----------
+    positions, displacement : (n, d)
+
+    Returns
+    -------
+    float
+        In the unit of the arguments; nan for a single node.
+
+    Examples
+    --------
+    Two nodes, a length of 10 apart, come closer by 0.2:
+
+    >>> ends = np.array([[0.0, 0.0], [10.0, 0.0]])
+    >>> round(deformation_of(ends, np.array([[0.1, 5.0], [-0.1, 5.0]])), 9)
+    0.1
+    """
+    from scipy.spatial.transform import Rotation
+
+    rotation = np.radians(best_fit_rotation(positions, displacement))
+    if np.isnan(rotation).any():
+        return math.nan
+    in_plane = positions.shape[1] == 2
+    vector = np.array([0.0, 0.0, float(rotation)]) if in_plane else rotation
+    dimension = positions.shape[1]
+    turn = Rotation.from_rotvec(vector).as_matrix()[:dimension, :dimension]
+    before = positions - positions.mean(axis=0)
+    after = positions + displacement
+    apart = after - after.mean(axis=0) - before @ turn.T
+    return float(np.linalg.norm(apart, axis=1).max())
 
 
 def turned_positions(

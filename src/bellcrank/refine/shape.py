@@ -231,7 +231,8 @@ def _gap_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
 def _domain_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
     """Return the constraints on the distances of struts from the boundary of the domain.
 
-    Ends that keep their positions have none: they may be on the boundary, as those at supports.
+    Ends that keep their positions may be at the boundary, as those at supports: struts are there as
+    wide as twice the distance from it, or as the section if that is more.
     """
     wanted, lattice = problem.specification, problem.lattice
     domain = () if wanted is None else wanted.domain
@@ -240,8 +241,9 @@ def _domain_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
     share = np.tile(np.array(SHARES), len(beams))
     beam = np.repeat(beams, len(SHARES))
     end = lattice.beams[beam, (share > 0.5).astype(np.int64)]
-    chosen = np.flatnonzero((share % 1.0 > 0.0) | ~held[end] if domain else np.zeros(0, bool))
-    beam, share = beam[chosen], share[chosen]
+    if not domain:
+        beam, share, end = beam[:0], share[:0], end[:0]
+    is_held = held[end] & (share % 1.0 == 0.0)
     ends, width = lattice.beams[beam], problem.beam_widths[beam]
     weights = np.stack([1.0 - share, share], axis=1)
     points = np.einsum("pk,pkd->pd", weights, lattice.positions[ends])
@@ -252,10 +254,14 @@ def _domain_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
         )
     found = distances_inside(points, domain, (0.5 + NEAR_DOMAIN) * float(width.max()))
     beam, share, width = beam[found.point], share[found.point], width[found.point]
-    ends, weights = ends[found.point], weights[found.point]
-    value = 0.5 - found.value / width
+    ends, weights, is_held = ends[found.point], weights[found.point], is_held[found.point]
+    # A held end closer to the boundary than half of the section is as far as that.
+    least = 0.5 * problem.section.width if problem.section is not None else 0.0
+    is_held &= found.value < least
+    distance = np.where(is_held, least, found.value)
+    value = 0.5 - distance / width
     near = np.flatnonzero(value > -NEAR_DOMAIN)
-    rate = -(found.slopes / width[:, None])[near]
+    rate = -(np.where(is_held[:, None], 0.0, found.slopes) / width[:, None])[near]
     return _rows_of(
         problem, "domain", value[near],
         np.column_stack([beam, np.rint(4.0 * share).astype(np.int64), found.face])[near],

@@ -25,6 +25,7 @@ from bellcrank.search.verdict import Verdict
 from bellcrank.search.verification import ELEMENTS
 from bellcrank.web.items import item_states, objective_states
 from bellcrank.web.task_files import problem_of
+from bellcrank.workflows.condition_texts import condition_texts
 from bellcrank.workflows.figures import model_words
 from bellcrank.workflows.part_figures import part_figures
 from bellcrank.workflows.specification import evaluated
@@ -147,7 +148,7 @@ def part_report(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
 
     The figures are those of frames with eight elements in each strut, for each output of each load
     case. Items are given in the model of the search and by eight elements; None for a path that is
-    not stable. Objectives are by eight elements.
+    not stable. Objectives are by eight elements. Conditions are the inputs and loads in words.
     """
     spec = PartSpec.from_dict(part, "part")
     design = design_of(text, mask)
@@ -163,6 +164,7 @@ def part_report(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
         "specified": problem.is_specified,
         "items": items,
         "objectives": objectives,
+        "conditions": condition_texts(problem, spec),
         "figures": part_figures(design, spec, ELEMENTS),
     }
 

@@ -17,6 +17,7 @@ from bellcrank.mechanics import (
 )
 from bellcrank.mechanics.frames.analysis import strain_amplitude
 from bellcrank.mechanics.frames.output_loads import with_output
+from bellcrank.mechanics.output import deformation_of
 from bellcrank.task import units_of
 
 if TYPE_CHECKING:
@@ -85,6 +86,10 @@ def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> li
                 row |= _motion(evaluator, output, units)
                 stiffness = row["output_stiffness_N_per_mm"] or 0.0
                 wanted = with_output(case, output)
+                nodes = wanted.output.nodes
+                rest, moved = case.lattice.positions[nodes], response.displacement[nodes]
+                deformation = units.in_part("length", deformation_of(rest, moved))
+                row["output_deformation_mm"] = finite(deformation)
                 travel = row["travel_mm"] / units.length
                 first = 0.5 * travel * units.in_problem("stiffness", stiffness)
                 payload = _halving_load(wanted, design.mask, elements, travel, first, dead=False)

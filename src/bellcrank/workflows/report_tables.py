@@ -73,6 +73,7 @@ FIGURES = (
     ("travel", ("travel_mm",), "{:.3g}", "mm"),
     ("off-axis motion", ("off_axis",), "{:.1%}", ""),
     ("rotation", ("rotation_deg",), "{:.2g}", "deg"),
+    ("deformation of the output", ("output_deformation_mm",), "{:.2g}", "mm"),
     ("input force, largest along the stroke", ("largest_input_force_N",), "{:.3g}", "N"),
     ("output stiffness", ("output_stiffness_N_per_mm",), "{:.3g}", "N/mm"),
     ("payload that halves the travel", ("payload_N",), "{:.3g}", "N"),

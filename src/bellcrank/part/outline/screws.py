@@ -21,6 +21,9 @@ _ACROSS = 120
 _INSIDE = 0.75
 """Preferred clearance of screws, as a fraction of the largest clearance in the plate."""
 
+_SWEEPS = 50
+"""Largest number of times that each screw is placed again."""
+
 
 def drilled(outline: Outline, centres: ArrayLike, diameter: float, wall: float) -> Outline:
     """Return an outline with circular holes.
@@ -199,7 +202,10 @@ def _distance(loop: Loop, points: Reals) -> Reals:
 
 
 def _far_apart(points: Reals, count: int) -> Reals:
-    """Return points, each as far as possible from the previous ones."""
+    """Return points that are as far from each other as possible.
+
+    Each is first placed as far as possible from the previous ones, then from all others in turn.
+    """
     if not len(points):
         return points
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
@@ -210,6 +216,16 @@ def _far_apart(points: Reals, count: int) -> Reals:
     while len(chosen) < count:
         chosen.append(int(np.argmax(away)))
         away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    for _ in range(_SWEEPS):
+        before = list(chosen)
+        for place in range(count):
+            others = points[chosen[:place] + chosen[place + 1 :]]
+            away = np.linalg.norm(points[:, None] - others, axis=2).min(axis=1)
+            farthest = int(np.argmax(away))
+            if away[farthest] > away[chosen[place]] * (1.0 + 1e-9):
+                chosen[place] = farthest
+        if chosen == before:
+            break
     return points[chosen]
 
 

@@ -1,0 +1,100 @@
+"""Inputs and loads of a task in words, under which its items hold."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bellcrank.task import units_of
+from bellcrank.task.values import DIRECTIONS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from bellcrank.model import Problem
+    from bellcrank.model.conditions import Input, Output
+    from bellcrank.model.loads import Loads
+    from bellcrank.part import PartSpec
+    from bellcrank.task import ProblemUnits
+
+NAMED = 0.9999
+"""Cosine of the angle to a direction with a name above which the name is used."""
+
+
+def condition_texts(problem: Problem, part: PartSpec) -> list[str]:
+    """Return the input and the loads of each load case, each as one text.
+
+    Parameters
+    ----------
+    problem
+        Problem of a frame.
+    part
+        Size and material of the part.
+
+    Examples
+    --------
+    >>> from bellcrank.task import find_task
+    >>> task = find_task("selector")
+    >>> condition_texts(task.problem, task.part)
+    ['A: input 3 mm right', 'B: input 3 mm left']
+    """
+    units = units_of(problem, part)
+    several = len(problem.cases) > 1
+    found = []
+    for name, case in problem.cases.items():
+        start = f"{name}: " if several else ""
+        springs = [
+            _output_text(key, each, units) for key, each in case.outputs.items() if each.spring
+        ]
+        texts = [_input_text(case.input, units), *_load_texts(case.loads, units), *springs]
+        found += [f"{start}{text}" for text in texts]
+    return found
+
+
+def _input_text(given: Input, units: ProblemUnits) -> str:
+    if given.drive == "force":
+        size = units.in_part("force", given.amount)
+        return f"input of {size:.3g} N {_direction(given.direction)}"
+    size = units.in_part("length", given.amount)
+    return f"input {size:.3g} mm {_direction(given.direction)}"
+
+
+def _output_text(name: str, output: Output, units: ProblemUnits) -> str:
+    assert output.spring is not None
+    size = units.in_part("stiffness", output.spring * len(output.nodes))
+    return f"spring of {size:.3g} N/mm against {name}"
+
+
+def _load_texts(loads: Loads, units: ProblemUnits) -> list[str]:
+    found = []
+    for force in loads.forces:
+        whole = force.force.sum(axis=0)
+        size = units.in_part("force", float(np.linalg.norm(whole)))
+        where = f"{_direction(whole)} on {_nodes(force.nodes)}"
+        found.append(f"load of {size:.3g} N {where}, grows with the input")
+    for spring in loads.springs:
+        size = units.in_part("stiffness", spring.stiffness * len(spring.nodes))
+        towards = _direction(spring.direction)
+        found.append(f"spring of {size:.3g} N/mm at {_nodes(spring.nodes)}, {towards}")
+    if loads.weight is not None:
+        found.append(f"own weight {_direction(loads.weight)}, grows with the input")
+    return found
+
+
+def _nodes(nodes: NDArray[np.int64]) -> str:
+    return "1 node" if len(nodes) == 1 else f"{len(nodes)} nodes"
+
+
+def _direction(vectors: NDArray[np.float64]) -> str:
+    """Return a direction in words, its angle in the plane, or its components in space."""
+    each = np.atleast_2d(vectors)
+    unit = each / np.linalg.norm(each, axis=1)[:, None]
+    if (unit @ unit[0] < NAMED).any():
+        return "in a direction at each node"
+    for name, axis in DIRECTIONS[len(unit[0])].items():
+        if unit[0] @ axis > NAMED:
+            return name
+    if len(unit[0]) == 2:
+        return f"at {np.degrees(np.arctan2(unit[0, 1], unit[0, 0])):.0f} deg"
+    return f"along ({', '.join(f'{value:.2f}' for value in unit[0])})"

@@ -1,0 +1,68 @@
+"""Inputs and loads of a task in words."""
+
+from __future__ import annotations
+
+from bellcrank.task import task_from_dict
+from bellcrank.workflows.condition_texts import condition_texts
+
+
+def test_every_load_of_a_task_is_listed() -> None:
+    task = task_from_dict(
+        {
+            "name": "arm",
+            "domain": {"size": ["92 mm", "72 mm"]},
+            "supports": [{"at": {"edge": "left"}}],
+            "cases": [
+                {
+                    "inputs": [
+                        {"at": {"point": [60, 2]}, "direction": "up", "displacement": "3 mm"}
+                    ],
+                    "outputs": [
+                        {
+                            "at": {"point": [88, 70], "count": 2}, "direction": "up",
+                            "gain": "maximise", "spring": "0.2 N/mm",
+                        }
+                    ],
+                    "loads": [
+                        {"at": {"point": [88, 70], "count": 2}, "force": "0.05 N", "direction": "30deg"},
+                        {"at": {"point": [88, 2]}, "spring": "0.1 N/mm", "direction": "right"},
+                    ],
+                    "gravity": "down",
+                }
+            ],
+        }
+    )  # fmt: skip
+    assert condition_texts(task.problem, task.part) == [
+        "input 3 mm up",
+        "load of 0.05 N at 30 deg on 2 nodes, grows with the input",
+        "spring of 0.1 N/mm at 1 node, right",
+        "own weight down, grows with the input",
+        "spring of 0.2 N/mm against output",
+    ]
+
+
+def test_a_direction_in_space_without_a_name_has_components() -> None:
+    task = task_from_dict(
+        {
+            "name": "column",
+            "domain": {"size": ["42 mm", "42 mm", "42 mm"]},
+            "part": {"width": "2 mm"},
+            "supports": [{"at": {"face": "bottom"}}],
+            "cases": [
+                {
+                    "inputs": [
+                        {
+                            "at": {"point": [7, 7, 35]},
+                            "direction": [0, 3, 4],
+                            "displacement": "2 mm",
+                        }
+                    ],
+                    "outputs": [
+                        {"at": {"point": [21, 21, 21]}, "direction": "up", "gain": "maximise"}
+                    ],
+                }
+            ],
+        }
+    )
+    (text,) = condition_texts(task.problem, task.part)
+    assert text == "input 2 mm along (0.00, 0.60, 0.80)"
