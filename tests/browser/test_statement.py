@@ -164,7 +164,8 @@ def test_the_best_design_so_far_is_opened_and_two_searches_have_two_names(page: 
         )
     )
     assert reached["left"] == reached["right"]
-    page.get_by_role("heading", name="Objective along the search, before refinement: left jaw: gain").wait_for()
+    title = "Objective along the search, before refinement: left jaw: gain"
+    page.get_by_role("heading", name=title).wait_for()
     with page.context.expect_page() as opened:
         page.get_by_role("button", name="Open the best so far").click()
     other = opened.value

@@ -24,7 +24,10 @@ def test_every_load_of_a_task_is_listed() -> None:
                         }
                     ],
                     "loads": [
-                        {"at": {"point": [88, 70], "count": 2}, "force": "0.05 N", "direction": "30deg"},
+                        {
+                            "at": {"point": [88, 70], "count": 2}, "force": "0.05 N",
+                            "direction": "30deg",
+                        },
                         {"at": {"point": [88, 2]}, "spring": "0.1 N/mm", "direction": "right"},
                     ],
                     "gravity": "down",

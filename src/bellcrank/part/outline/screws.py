@@ -218,12 +218,12 @@ def _far_apart(points: Reals, count: int) -> Reals:
         away = np.minimum(away, np.linalg.norm(points - points[chosen[-1]], axis=1))
     for _ in range(_SWEEPS):
         before = list(chosen)
-        for place in range(count):
-            others = points[chosen[:place] + chosen[place + 1 :]]
+        for screw in range(count):
+            others = points[chosen[:screw] + chosen[screw + 1 :]]
             away = np.linalg.norm(points[:, None] - others, axis=2).min(axis=1)
             farthest = int(np.argmax(away))
-            if away[farthest] > away[chosen[place]] * (1.0 + 1e-9):
-                chosen[place] = farthest
+            if away[farthest] > away[chosen[screw]] * (1.0 + 1e-9):
+                chosen[screw] = farthest
         if chosen == before:
             break
     return points[chosen]
