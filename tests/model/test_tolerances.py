@@ -27,7 +27,13 @@ def task(**tolerance: object) -> dict[str, object]:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("width", -0.1), ("each_width", 0.5), ("node", float("nan")), ("least_yield", 1.2)],
+    [
+        ("width", -0.1),
+        ("each_width", 0.5),
+        ("node", float("nan")),
+        ("least_yield", 1.2),
+        ("keep", 1.0),
+    ],
 )
 def test_values_out_of_range_are_refused(name: str, value: float) -> None:
     with pytest.raises(InvalidProblem, match=rf"^tolerances: {name}: expected a number"):
@@ -52,7 +58,7 @@ def test_an_error_names_the_key_of_the_task() -> None:
 
 
 def test_they_are_stored_with_a_problem(tmp_path: Path) -> None:
-    problem = task_from_dict(task(width="15%", least_yield="90%")).problem
+    problem = task_from_dict(task(width="15%", least_yield="90%", keep="80%")).problem
     write_problem(problem, tmp_path / "problem.json")
     again = read_problem(tmp_path / "problem.json")
     assert again.specification is not None

@@ -14,7 +14,7 @@ from bellcrank.refine import RefinementSettings, refine_design
 from bellcrank.refine.active import FAR, ROOM, ActiveRows
 from bellcrank.refine.choice import LARGER, ScenarioChoice
 from bellcrank.refine.row_evaluator import RowEvaluator
-from bellcrank.refine.scenarios import NEAR, PARTS, LossRows, ScenarioRows, reduced_rows
+from bellcrank.refine.scenarios import NEAR, PARTS, KeptRows, ScenarioRows, reduced_rows
 from bellcrank.refine.variables import variables_of
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.search.strut_loss import StrutLosses
@@ -69,7 +69,8 @@ def test_the_loss_of_a_strut_has_the_derivative_of_differences(*, with_own_joint
     losses = StrutLosses(design.problem).by_strut(design.mask)
     beam = max((each for each in losses if losses[each] < 0.6), key=losses.__getitem__)
     variables = variables_of(design, 0.4, (0.2, 0.4))
-    rows = LossRows(variables, design.mask, beam, 0.3)
+    lost = Scenario(name="", kind="strut", missing=beam)
+    rows = KeptRows(variables, design.mask, 0.7, lost)
     found = rows.evaluate(np.zeros(variables.count), slopes=True)
     assert found is not None
     # The efficiency is the mean motion over that of the input, as the gain is.
@@ -80,6 +81,56 @@ def test_the_loss_of_a_strut_has_the_derivative_of_differences(*, with_own_joint
     assert behind is not None
     expected = (ahead.constraints[0] - behind.constraints[0]) / (2.0 * step)
     assert found.constraint_slopes[0] @ way == pytest.approx(expected, rel=1e-4)
+
+
+def test_the_kept_efficiency_has_the_derivative_of_differences() -> None:
+    design = tolerant_crane()
+    variables = variables_of(design, 0.4, (0.2, 0.4))
+    thin = Scenario(name="", kind="widths", widths=np.full(len(design.mask), 0.8))
+    rows = KeptRows(variables, design.mask, 0.9, thin)
+    start = np.zeros(variables.count)
+    found = rows.evaluate(start, slopes=True)
+    assert found is not None
+    assert found.names[0] == "kept"
+    assert not len(found.objectives)
+    evaluator = ScenarioEvaluator(with_kept(design, 0.9))
+    drawn = evaluator.evaluate(Scenario(name="", kind="nominal"))
+    result = evaluator.evaluate(thin)
+    ratio = result.efficiency / drawn.efficiency
+    assert found.constraints[0] == pytest.approx((1.0 - ratio) / 0.1 - 1.0, abs=1e-6)
+    assert result.kept == pytest.approx(ratio / 0.9 - 1.0)
+    assert result.met == (ratio >= 0.9)
+    assert result.margin == result.kept
+    way, step = np.random.default_rng(0).normal(size=variables.count), 1e-6
+    ahead, behind = (rows.evaluate(sign * step * way) for sign in (1.0, -1.0))
+    assert ahead is not None
+    assert behind is not None
+    expected = (ahead.constraints - behind.constraints) / (2.0 * step)
+    assert found.constraint_slopes @ way == pytest.approx(expected, rel=1e-4, abs=1e-6)
+    rows.maximise_margins()
+    margins = rows.evaluate(start)
+    assert margins is not None
+    assert margins.objectives == pytest.approx(-found.constraints[:1])
+
+
+def with_kept(design: Design, keep: float) -> Design:
+    """Return a design whose efficiency is to keep a part of that as drawn."""
+    wanted = design.problem.specification
+    assert wanted is not None
+    wanted = replace(wanted, tolerances=Tolerances(width=0.2, keep=keep))
+    return replace(design, problem=replace(design.problem, specification=wanted))
+
+
+@pytest.mark.slow
+def test_a_refinement_keeps_the_efficiency_in_most_prints() -> None:
+    design = with_kept(tolerant_crane(), 0.9)
+    found = refine_design(design, RefinementSettings(evaluations=120, prints=20))
+    evaluator = ScenarioEvaluator(found.design)
+    results = [evaluator.evaluate(each) for each in ScenarioChoice(design, 20).all]
+    share = np.mean([each.met for each in results])
+    assert found.after.share == pytest.approx(min(share, 0.95))
+    assert found.after.share == 0.95
+    assert found.after.objective > found.before.objective
 
 
 def test_rows_of_scenarios_follow_those_of_the_drawn_part() -> None:
@@ -116,7 +167,7 @@ def with_little_sag(factor: float) -> Design:
 
 
 def rows_of(design: Design) -> Callable[[Scenario | None], RowEvaluator]:
-    """Return the function from a scenario to its rows."""
+    """Return the function from a scenario to its rows, from None to those as drawn."""
     variables, wanted = variables_of(design, 0.4, (0.2, 0.4)), design.problem.specification
     assert wanted is not None
     return lambda scenario: RowEvaluator(variables, design.mask, wanted.items, scenario=scenario)
@@ -124,15 +175,13 @@ def rows_of(design: Design) -> Callable[[Scenario | None], RowEvaluator]:
 
 def active_rows(design: Design, choice: ScenarioChoice) -> ActiveRows:
     """Return the rows of active scenarios of a design that is not moved yet."""
-    variables = rows_of(design)(None).variables
-
-    def loss_rows_of(beam: int) -> LossRows:
-        return LossRows(variables, design.mask, beam, 0.3)
+    drawn = rows_of(design)(None)
+    variables = drawn.variables
 
     def design_at(vector: np.ndarray) -> Design:
         return replace(design, problem=variables.problem_at(vector))
 
-    return ActiveRows(choice, rows_of(design), loss_rows_of, design_at, np.zeros(variables.count))
+    return ActiveRows(choice, drawn, rows_of(design), design_at, np.zeros(variables.count))
 
 
 def test_a_scenario_that_is_far_from_being_met_is_reduced() -> None:

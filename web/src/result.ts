@@ -248,7 +248,7 @@ export class Result {
   /** How many random prints meet all items, if the tolerance is known. */
   private printedText(): string {
     const { tolerance } = this.known;
-    return tolerance && typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} meet all items.` : "";
+    return tolerance && typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} ${tolerance.met_words}.` : "";
   }
 
   private showTable(): void {

@@ -33,7 +33,7 @@ export interface Domain {
   holes?: Shape[]; keep_out?: Shape[]; solid?: Shape[];
 }
 export interface Limits { strain?: Amount | boolean; clearance?: Amount | boolean; stable_stroke?: Amount; strut_loss?: Amount; mass?: Amount; symmetry?: string; upright?: Direction }
-export interface Tolerance { width?: Amount; each_width?: Amount; node?: Amount; angle?: Amount; least_yield?: Amount }
+export interface Tolerance { width?: Amount; each_width?: Amount; node?: Amount; angle?: Amount; least_yield?: Amount; keep?: Amount }
 export interface Table {
   name: string; description?: string;
   part?: { width?: Amount; thickness?: Amount; spacing?: Amount; fillet?: Amount; joint?: Amount; material?: string | Material };

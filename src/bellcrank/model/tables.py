@@ -109,6 +109,7 @@ class TolerancesTable(Table):
     node: float
     angle: float
     least_yield: float
+    keep: float = 0.0
 
 
 class SpecificationTable(Table):

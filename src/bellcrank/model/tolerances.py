@@ -11,7 +11,14 @@ from bellcrank.errors import InvalidProblem
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-LARGEST = {"width": 0.9, "each_width": 0.3, "node": math.inf, "angle": 90.0, "least_yield": 1.0}
+LARGEST = {
+    "width": 0.9,
+    "each_width": 0.3,
+    "node": math.inf,
+    "angle": 90.0,
+    "least_yield": 1.0,
+    "keep": 0.99,
+}
 """Largest value of each tolerance; the smallest one is 0."""
 
 
@@ -41,6 +48,9 @@ class Tolerances:
         Largest deviation of the direction of the input, degrees.
     least_yield
         Part of random prints with these deviations that are to meet all items.
+    keep
+        Smallest efficiency with deviations over that as drawn. Items are to be met as drawn alone
+        then, and the yield is that of this bound. 0: all items are to be met with deviations too.
 
     Raises
     ------
@@ -58,14 +68,16 @@ class Tolerances:
     node: float = 0.01
     angle: float = 5.0
     least_yield: float = 0.95
+    keep: float = 0.0
 
     def __post_init__(self) -> None:
         if fault := out_of_range(self, LARGEST):
             raise InvalidProblem(f"tolerances: {fault}")
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain data."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        """Return plain data; `keep` if it is not 0."""
+        found = {field.name: getattr(self, field.name) for field in fields(self)}
+        return found if self.keep else {name: found[name] for name in found if name != "keep"}
 
 
 USUAL = Tolerances()

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from bellcrank.refine.scenarios import NEAR, ScenarioRows, Update, reduced_rows
+from bellcrank.tolerance import Scenario
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
     from bellcrank.model import Design
     from bellcrank.refine.choice import Outcome, ScenarioChoice
     from bellcrank.refine.row_evaluator import RowEvaluator
-    from bellcrank.refine.scenarios import LossRows
-    from bellcrank.tolerance import Scenario
+    from bellcrank.refine.rows import Rows
+    from bellcrank.refine.scenarios import Part
 
     Values = NDArray[np.float64]
 
@@ -43,10 +44,10 @@ class ActiveRows(ScenarioRows):
     ----------
     choice
         The scenarios.
+    drawn
+        Rows of the design as drawn.
     rows_of
-        Function to the rows of a scenario, and to those as drawn for None.
-    loss_rows_of
-        Function to the constraint on the loss of a strut.
+        Function to the rows of a scenario, such as a lost strut.
     design_at
         Function from variables to a design.
     vector : (n,)
@@ -56,24 +57,25 @@ class ActiveRows(ScenarioRows):
     def __init__(
         self,
         choice: ScenarioChoice,
-        rows_of: Callable[[Scenario | None], RowEvaluator],
-        loss_rows_of: Callable[[int], LossRows],
+        drawn: RowEvaluator,
+        rows_of: Callable[[Scenario], Part],
         design_at: Callable[[Values], Design],
         vector: Values,
     ) -> None:
         self.choice, self.design_at = choice, design_at
-        self._rows_of, self._loss_rows_of = rows_of, loss_rows_of
-        self._scenarios: dict[int, RowEvaluator] = {}
-        self._losses: dict[int, LossRows] = {}
+        self._rows_of = rows_of
+        self._scenarios: dict[int, Part] = {}
+        self._losses: dict[int, Part] = {}
         self._accepted = vector
         outcomes = sorted(self._outcomes(vector), key=lambda each: each.margin)
         far = [each.scenario for each in outcomes if each.margin < -FAR]
         self._far = {id(each) for each in far}
         extreme = [each for each in far if each.kind != "print"]
         self.is_reduced = bool(extreme) or len(far) > choice.allowed
-        drawn = self._new_rows(None)
+        if self.is_reduced:
+            drawn.maximise_margins()
         super().__init__(drawn, [])
-        self._reduced: list[RowEvaluator] = []
+        self._reduced: list[Part] = []
         now = drawn.evaluate(vector)
         if self.is_reduced and now is not None and now.violation <= NEAR:
             prints = [each for each in far if each.kind == "print"][:REDUCED]
@@ -147,34 +149,39 @@ class ActiveRows(ScenarioRows):
         Those remain whose objectives are near the smallest.
         """
         rows = [(each, self._rows_in(each).evaluate(vector)) for each in self.choice.chosen]
-        least = min((found.objective for _, found in rows if found is not None), default=0.0)
-        bound = least + ROOM * max(abs(least), 0.1)
+        least = min((_objective(found) for _, found in rows if found is not None), default=0.0)
+        bound = least + ROOM * max(abs(least), 0.1) if math.isfinite(least) else -math.inf
         return [
             each
             for each, found in rows
             if found is None
             or found.constraints.max(initial=-math.inf) > -ROOM
-            or found.objective < bound
+            or _objective(found) < bound
         ]
 
-    def _new_rows(self, scenario: Scenario | None) -> RowEvaluator:
+    def _new_rows(self, scenario: Scenario) -> Part:
         """Return new rows of a scenario."""
         rows = self._rows_of(scenario)
         if self.is_reduced:
             rows.maximise_margins()
         return rows
 
-    def _rows_in(self, scenario: Scenario) -> RowEvaluator:
+    def _rows_in(self, scenario: Scenario) -> Part:
         """Return the rows of a scenario."""
         if id(scenario) not in self._scenarios:
             self._scenarios[id(scenario)] = self._new_rows(scenario)
         return self._scenarios[id(scenario)]
 
-    def _loss_rows(self, beam: int) -> LossRows:
+    def _loss_rows(self, beam: int) -> Part:
         """Return the constraint on a lost strut."""
         if beam not in self._losses:
-            self._losses[beam] = self._loss_rows_of(beam)
+            self._losses[beam] = self._rows_of(Scenario(name="", kind="strut", missing=beam))
         return self._losses[beam]
+
+
+def _objective(rows: Rows) -> float:
+    """Return the smallest objective; infinity without any."""
+    return rows.objective if len(rows.objectives) else math.inf
 
 
 def _room(outcome: Outcome, smallest: float) -> float:

@@ -14,7 +14,7 @@ from bellcrank.refine.choice import ScenarioChoice
 from bellcrank.refine.differences import NO_DIFFERENCE, difference
 from bellcrank.refine.refinement import UNSTABLE, RefinementSettings, refine_rows
 from bellcrank.refine.row_evaluator import STABLE, RowEvaluator
-from bellcrank.refine.scenarios import LossRows, ScenarioRows
+from bellcrank.refine.scenarios import KeptRows, ScenarioRows
 from bellcrank.refine.state import State, is_better, latest_met, loses_payload, state_of
 from bellcrank.refine.variables import variables_of
 from bellcrank.search import SpecificationEvaluator
@@ -223,17 +223,18 @@ class FrameRefinement:
         payloads = {each.name: each for each in self.items if each.quantity in CARRIED}
         in_scenarios = [payloads.get(each.name, each) for each in items]
 
-        def rows_of(scenario: Scenario | None) -> RowEvaluator:
-            own = items if scenario is None else in_scenarios
-            return RowEvaluator(self.variables, self.design.mask, own, stable, models, scenario)
+        of_design = self.variables, self.design.mask
+        drawn = RowEvaluator(*of_design, items, stable, models)
 
-        def loss_rows_of(beam: int) -> LossRows:
-            assert self.choice.largest_loss is not None
-            return LossRows(self.variables, self.design.mask, beam, self.choice.largest_loss)
+        def rows_of(scenario: Scenario) -> RowEvaluator | KeptRows:
+            least = self.choice.least_kept(scenario)
+            if least > 0.0:
+                return KeptRows(*of_design, least, scenario)
+            return RowEvaluator(*of_design, in_scenarios, stable, models, scenario)
 
         if self.choice.is_empty:
-            return ScenarioRows(rows_of(None), [])
-        rows = ActiveRows(self.choice, rows_of, loss_rows_of, self._design_at, vector)
+            return ScenarioRows(drawn, [])
+        rows = ActiveRows(self.choice, drawn, rows_of, self._design_at, vector)
         self.is_reduced = rows.is_reduced
         return rows
 
@@ -258,6 +259,8 @@ class FrameRefinement:
         if self.choice.tolerances is None or not state.is_stable:
             return state
         found = self.choice.robustness(self._design_at(vector))
+        if self.choice.tolerances.keep:
+            return replace(state, share=found.share)
         return replace(state, share=found.share, objective=found.objective)
 
     def _design_at(self, vector: Values) -> Design:

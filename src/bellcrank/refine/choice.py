@@ -112,6 +112,15 @@ class ScenarioChoice:
         """Whether only the design as drawn counts."""
         return self.tolerances is None and self.largest_loss is None
 
+    def least_kept(self, scenario: Scenario) -> float:
+        """Return the smallest efficiency in a scenario over that as drawn.
+
+        0 if items are to be met there in place of it.
+        """
+        if scenario.missing is not None:
+            return 1.0 - (1.0 if self.largest_loss is None else self.largest_loss)
+        return 0.0 if self.tolerances is None else self.tolerances.keep
+
     @property
     def allowed(self) -> int:
         """Number of scenarios that may be far from being met: other prints miss items too."""
@@ -122,7 +131,7 @@ class ScenarioChoice:
     @property
     def largest_area(self) -> float:
         """Largest area of the section of a strut over that as drawn, of all struts together."""
-        if self.tolerances is None:
+        if self.tolerances is None or self.tolerances.keep:
             return 1.0
         return float((1.0 + self.tolerances.width) ** self._power)
 
@@ -144,7 +153,7 @@ class ScenarioChoice:
         scales = [each.scale for each in wanted.maximise]
         results = ((each, evaluator.evaluate(each)) for each in scenarios)
         return [
-            Outcome(each, _margin(result), _objective(result, scales), result.met)
+            Outcome(each, result.margin, _objective(result, scales), result.met)
             for each, result in results
         ]
 
@@ -186,17 +195,12 @@ def _largest_loss(wanted: Specification) -> float | None:
     return min((bound for bound in bounds if bound is not None), default=None)
 
 
-def _margin(result: ScenarioResult) -> float:
-    """Return the smallest margin of the items; minus infinity without a stable path."""
-    if not result.is_stable:
-        return -math.inf
-    return min((each.margin for each in result.items), default=math.inf)
-
-
 def _objective(result: ScenarioResult, scales: Sequence[float]) -> float:
     """Return the smallest objective, or margin without any; minus infinity if the path is lost."""
     if not result.is_stable:
         return -math.inf
+    if result.kept is not None:
+        return math.inf  # that of the design as drawn counts
     if not scales:
-        return _margin(result)
+        return result.margin
     return min(value / scale for value, scale in zip(result.objectives, scales, strict=True))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -88,8 +88,8 @@ class RowEvaluator:
     scenario
         Deviation with which the responses are computed; None for none. The shape at rest is no
         constraint then.
-    objectives_only
-        Whether there are no constraints besides those of `items`.
+    kinds
+        Constraints besides those of `items`: all, those on the stability of the path, or none.
     """
 
     def __init__(
@@ -101,12 +101,12 @@ class RowEvaluator:
         models: Sequence[Difference] = (NO_DIFFERENCE,),
         scenario: Scenario | None = None,
         *,
-        objectives_only: bool = False,
+        kinds: Literal["all", "stability", "objectives"] = "all",
     ) -> None:
         self.variables = variables
         self.mask = mask
         self.scenario = scenario
-        self.objectives_only = objectives_only
+        self.kinds = kinds
         self.has_objectives = True
         self.models = tuple(models)
         self.items = tuple(items)
@@ -144,15 +144,17 @@ class RowEvaluator:
             return None
         parts = []
         for name in here.evaluator.cases:
-            kinds = [self._channel_rows]
-            if not self.objectives_only:
-                kinds += [self._gap_rows, self._stability_rows]
-            for rows_of in kinds:
+            functions = [self._channel_rows]
+            if self.kinds == "all":
+                functions.append(self._gap_rows)
+            if self.kinds != "objectives":
+                functions.append(self._stability_rows)
+            for rows_of in functions:
                 rows = rows_of(here, name, slopes=slopes)
                 if rows is None:
                     return None
                 parts.append(rows)
-        if self.scenario is None and not self.objectives_only:
+        if self.scenario is None and self.kinds == "all":
             parts.append(self._shape_rows(here.problem, slopes=slopes))
         return joined(parts)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from bellcrank.refine.rows import Rows, joined
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from typing import Protocol
 
     from numpy.typing import NDArray
 
@@ -23,21 +22,24 @@ if TYPE_CHECKING:
 
     Values = NDArray[np.float64]
 
-    class Part(Protocol):
-        """Some of the rows."""
-
-        @property
-        def soft_states(self) -> int:
-            """As `RowEvaluator.soft_states`."""
-
-        def evaluate(self, vector: Values, *, slopes: bool = False) -> Rows | None:
-            """As `RowEvaluator.evaluate`."""
-
-
 PARTS = (0.85, 0.7, 0.5, 0.3, 0.15)
 """Parts of a deviation, the largest first."""
 NEAR = 0.5
 """Largest sum of violations of a scenario that is near to being met."""
+
+
+class Part(Protocol):
+    """Some of the rows."""
+
+    @property
+    def soft_states(self) -> int:
+        """As `RowEvaluator.soft_states`."""
+
+    def evaluate(self, vector: Values, *, slopes: bool = False) -> Rows | None:
+        """As `RowEvaluator.evaluate`."""
+
+    def maximise_margins(self) -> None:
+        """As `RowEvaluator.maximise_margins`."""
 
 
 class ScenarioRows:
@@ -99,8 +101,8 @@ class Update(NamedTuple):
 
 
 def reduced_rows(
-    rows_of: Callable[[Scenario], RowEvaluator], scenario: Scenario, vector: Values
-) -> RowEvaluator | None:
+    rows_of: Callable[[Scenario], Part], scenario: Scenario, vector: Values
+) -> Part | None:
     """Return the rows of the largest part of a scenario that a geometry is near meeting.
 
     None if it is not near meeting even a small part.
@@ -122,8 +124,10 @@ def reduced_rows(
     return None
 
 
-class LossRows:
-    """The constraint that the loss of a strut costs at most a part of the efficiency.
+class KeptRows:
+    """The constraint that the efficiency in a scenario is at least a part of that as drawn.
+
+    The path in the scenario is stable; items are not constraints there.
 
     Parameters
     ----------
@@ -131,42 +135,53 @@ class LossRows:
         Variables of the design.
     mask : (M,) bool
         Its beams.
-    beam
-        The strut.
-    largest
-        Largest loss.
+    least
+        Smallest efficiency in the scenario over that as drawn.
+    scenario
+        The scenario; one of a lost strut has no other deviation.
     """
 
     def __init__(
-        self, variables: Variables, mask: NDArray[np.bool_], beam: int, largest: float
+        self, variables: Variables, mask: NDArray[np.bool_], least: float, scenario: Scenario
     ) -> None:
         of_gain = replace(variables, problem=_with_gain(variables.problem))
-        self.largest, self.beam, without = largest, beam, mask.copy()
-        without[beam] = False
-        self.parts = [
-            RowEvaluator(of_gain, present, [], objectives_only=True) for present in (mask, without)
-        ]
+        self.least, self.name, self.key = least, "kept", (0,)
+        self.has_objectives = True
+        if scenario.missing is None:
+            deviating = RowEvaluator(of_gain, mask, [], scenario=scenario, kinds="stability")
+        else:
+            self.name, self.key, without = "strut_loss", (scenario.missing,), mask.copy()
+            without[scenario.missing] = False
+            deviating = RowEvaluator(of_gain, without, [], kinds="objectives")
+        self.parts = RowEvaluator(of_gain, mask, [], kinds="objectives"), deviating
 
     @property
     def soft_states(self) -> int:
-        """Number of states that are constraints: none."""
-        return 0
+        """Number of states that were soft or unstable in any geometry, and are constraints."""
+        return self.parts[1].soft_states
+
+    def maximise_margins(self) -> None:
+        """Make the margin the objective."""
+        self.has_objectives = False
 
     def evaluate(self, vector: Values, *, slopes: bool = False) -> Rows | None:
         """Return the constraint; None if a response is not stable."""
-        found = [part.evaluate(vector, slopes=slopes) for part in self.parts]
-        drawn, without = found
-        if drawn is None or without is None:
+        drawn, found = (part.evaluate(vector, slopes=slopes) for part in self.parts)
+        if drawn is None or found is None:
             return None
-        ratio = without.objectives / drawn.objectives
-        by_vector = without.objective_slopes - ratio[:, None] * drawn.objective_slopes
+        largest = 1.0 - self.least
+        ratio = found.objectives / drawn.objectives
+        loss = (1.0 - ratio) / largest - 1.0
+        by_vector = ratio[:, None] * drawn.objective_slopes - found.objective_slopes
+        by_vector /= largest * drawn.objectives[:, None]
+        count = 0 if self.has_objectives else 1
         return Rows(
-            np.zeros(0),
-            (1.0 - ratio) / self.largest - 1.0,
-            ("strut_loss",),
-            ((self.beam,),),
-            np.zeros((0, drawn.objective_slopes.shape[1])),
-            -by_vector / (self.largest * drawn.objectives[:, None]),
+            -loss[:count],
+            np.concatenate([loss, found.constraints]),
+            (self.name, *found.names),
+            (self.key, *((-1, *key) for key in found.keys)),
+            -by_vector[:count],
+            np.concatenate([by_vector, found.constraint_slopes]),
         )
 
 

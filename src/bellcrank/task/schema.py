@@ -260,6 +260,8 @@ class ToleranceSection(Table):
     """Largest deviation of the direction of the input."""
     least_yield: Ratio = USUAL.least_yield
     """Part of random prints that are to meet all items."""
+    keep: Ratio = USUAL.keep
+    """Smallest efficiency with deviations over that as drawn, where items hold as drawn alone."""
 
 
 class TaskTable(Table):

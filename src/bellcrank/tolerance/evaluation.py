@@ -32,12 +32,16 @@ class ScenarioResult(NamedTuple):
         Results of the items of the specification; empty without a stable path.
     objectives
         Values of the objectives, in the units of the problem; nan without a stable path.
+    kept
+        Efficiency over the smallest one that is tolerated (`Tolerances.keep`), less 1; None if all
+        items are to be met in place of it.
     """
 
     status: str
     efficiency: float
     items: list[ItemResult]
     objectives: list[float]
+    kept: float | None = None
 
     @property
     def is_stable(self) -> bool:
@@ -46,8 +50,19 @@ class ScenarioResult(NamedTuple):
 
     @property
     def met(self) -> bool:
-        """Whether a stable path leads to the full stroke, and all items are met."""
+        """Whether a stable path leads to the full stroke, and what is tolerated is met."""
+        if self.kept is not None:
+            return self.is_stable and self.kept >= 0.0
         return self.is_stable and all(each.met for each in self.items)
+
+    @property
+    def margin(self) -> float:
+        """The smallest margin of what is tolerated; minus infinity without a stable path."""
+        if not self.is_stable:
+            return -math.inf
+        if self.kept is not None:
+            return self.kept
+        return min((each.margin for each in self.items), default=math.inf)
 
 
 class ScenarioEvaluator:
@@ -84,6 +99,9 @@ class ScenarioEvaluator:
                 f"the design has no tolerance to compute: {response.status.message}"
             )
         self._nominal.set_reference()
+        tolerances = wanted.tolerances
+        keep = 0.0 if tolerances is None else tolerances.keep
+        self._least = keep * response.efficiency
 
     def _evaluator(self, problem: Problem) -> SpecificationEvaluator:
         gap = gap_of_frame if self.elements is None else smallest_gap
@@ -111,9 +129,10 @@ class ScenarioEvaluator:
             response = evaluator.evaluate(mask)
         if not response.is_admissible:
             return self._lost(response.status.label)
+        kept = response.efficiency / self._least - 1.0 if self._least > 0.0 else None
         return ScenarioResult(
             response.status.label, response.efficiency, evaluator.results(),
-            evaluator.objective_values(),
+            evaluator.objective_values(), kept,
         )  # fmt: skip
 
     def _lost(self, status: str) -> ScenarioResult:

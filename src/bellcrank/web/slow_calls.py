@@ -227,7 +227,7 @@ def tolerance(text: str, mask: str, part: dict[str, Any], share: str = "") -> di
     -------
     dict
         ``sentence`` on the scenarios; ``rows`` of texts, the first with the names of the columns;
-        ``met``, the number of random ``prints`` that meet all items;
+        ``met``, the number of random ``prints`` that meet all items, or what ``met_words`` say;
         ``losses``, the part of the efficiency that the loss of each strut costs: ``beams``, and
         ``cost``, None where the full stroke is not reached.
     """
@@ -235,6 +235,7 @@ def tolerance(text: str, mask: str, part: dict[str, Any], share: str = "") -> di
     from bellcrank.workflows.tolerance import (
         compute_tolerance,
         deviations_of,
+        met_words,
         tolerance_rows,
         tolerance_sentence,
     )
@@ -254,6 +255,7 @@ def tolerance(text: str, mask: str, part: dict[str, Any], share: str = "") -> di
         "sentence": tolerance_sentence(report),
         "prints": len(prints),
         "met": sum(report.tolerance.results[number].met for number in prints),
+        "met_words": met_words(report),
         "rows": tolerance_rows(report),
         "losses": {"beams": list(losses), "cost": [finite(each) for each in losses.values()]},
     }

@@ -119,11 +119,16 @@ class DesignReport:
         """By how many random prints the wanted yield is missed, in words; empty if it is not."""
         if self.tolerance is None:
             return ""
+        from bellcrank.workflows.tolerance import met_words
+
         found = self.tolerance.tolerance.print_yield
         wanted = self.tolerance.deviations.tolerances.least_yield
         if found >= wanted:
             return ""
-        return f"{found:.1%} of random prints meet all items, fewer than the {wanted:.1%} asked for"
+        return (
+            f"{found:.1%} of random prints {met_words(self.tolerance)}, fewer than the "
+            f"{wanted:.1%} asked for"
+        )
 
     @property
     def failures(self) -> list[str]:

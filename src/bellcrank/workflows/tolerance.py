@@ -303,8 +303,14 @@ def tolerance_sentence(report: ToleranceReport) -> str:
     )
     if prints := tolerance.of_kind("print"):
         met = sum(tolerance.results[number].met for number in prints)
-        sentence += f"; all items are met by {met} of {len(prints)} random prints"
+        sentence += f"; {met} of {len(prints)} random prints {met_words(report)}"
     return sentence
+
+
+def met_words(report: ToleranceReport) -> str:
+    """Return what random prints are to do, as a verb with its object."""
+    keep = report.deviations.tolerances.keep
+    return f"keep {keep:.0%} of the efficiency" if keep else "meet all items"
 
 
 def scenario_rows(report: ToleranceReport) -> list[list[str]]:
