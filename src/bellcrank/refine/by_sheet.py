@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.mechanics import item_results
+from bellcrank.mechanics.items import tightened
 from bellcrank.refine.by_frames import LOST_PAYLOAD, stricter
 from bellcrank.refine.differences import NO_DIFFERENCE
 from bellcrank.refine.state import State, loses_payload, total_violation
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from bellcrank.model import Design
+    from bellcrank.model import Design, Item
     from bellcrank.refine.by_frames import FrameRefinement, Models
     from bellcrank.refine.differences import Records
 
@@ -34,6 +35,9 @@ SHEET_STEPS = 40
 """Largest number of steps after the sheet misses items; fewer if the corrected items are met."""
 PROGRESS = 0.9
 """Ratio of the violations by frames of two geometries above which the sheet is given up."""
+SHEET_RESERVE = 0.04
+"""Part by which items with two bounds are tightened, so that finer meshes of the sheet meet them
+too; less than the reserve of the frames, at which a refinement aims."""
 HALVINGS = 2
 """Number of times the path of a refinement that is not near the sheet is halved."""
 
@@ -151,4 +155,12 @@ class SheetRefinement:
         if records is None:
             return state
         items = tuple(item_results(job.items, records))
-        return replace(state, sheet=items, sheet_records=records)
+        strict = item_results([_with_reserve(each) for each in job.items], records)
+        violation = total_violation(tuple(strict))
+        return replace(state, sheet=items, sheet_records=records, sheet_violation=violation)
+
+
+def _with_reserve(item: Item) -> Item:
+    """Return an item with two bounds as a coarse mesh has to meet it; others as they are."""
+    is_two_sided = item.at_least is not None and item.at_most is not None
+    return tightened(item, SHEET_RESERVE) if is_two_sided else item

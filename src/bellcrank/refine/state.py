@@ -49,6 +49,8 @@ class State:
         Items in the sheet; empty if they were not computed, or it is not stable.
     sheet_records
         The channels in the sheet.
+    sheet_violation
+        Sum of the violations in the sheet with a reserve for finer meshes.
     """
 
     objective: float
@@ -58,6 +60,7 @@ class State:
     share: float = 1.0
     sheet: tuple[ItemResult, ...] = ()
     sheet_records: Records = field(default_factory=dict)
+    sheet_violation: float = math.inf
 
     @property
     def rank(self) -> tuple[bool, float, float]:
@@ -81,8 +84,8 @@ class State:
 
     @property
     def missed_in_sheet(self) -> float:
-        """Sum of the violations in the sheet; infinite where it is not on the same path."""
-        return total_violation(self.sheet) if self.is_on_path_of_sheet else math.inf
+        """Sum of these violations; infinite where the sheet is not on the same path."""
+        return self.sheet_violation if self.is_on_path_of_sheet else math.inf
 
     @property
     def rank_in_sheet(self) -> tuple[float, float, float]:
