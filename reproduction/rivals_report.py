@@ -44,6 +44,7 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
     draw_shapes(
         [shape for shape in shapes if shape.curves],
         path,
+        columns=max(len(_by_method(task)) for task in figures["tasks"].values()),
         title="Force inverter and gripper by bellcrank and by topology optimisation",
         note="same box, mass, material, stroke and output spring; "
         "efficiencies of the outlines in nonlinear plane stress",

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 WIDTH, MARGIN, GAP, HEADING, FOOT = 11.0, 0.25, 0.3, 0.78, 0.55
-COLUMNS = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,12 +51,13 @@ class Shape:
 def draw_shapes(
     shapes: Sequence[Shape],
     path: str | os.PathLike[str],
+    columns: int,
     *,
     title: str = "",
     note: str = "",
     overwrite: bool = False,
 ) -> None:
-    """Draw outlines in rows of four at one scale.
+    """Draw outlines at one scale, some in each row.
 
     Raises
     ------
@@ -72,8 +72,8 @@ def draw_shapes(
     arrow = 0.13 * float((high - low)[0])
     room = np.array([arrow, 2.0])
     low, high = low - room, high + room
-    count = min(len(shapes), COLUMNS)
-    rows = -(-len(shapes) // COLUMNS)
+    count = min(len(shapes), columns)
+    rows = -(-len(shapes) // columns)
     scale = (WIDTH - 2 * MARGIN - GAP * (count - 1)) / count / float((high - low)[0])
     across, up = scale * (high - low)
     top = MARGIN + style.heading_height(title, note) + 0.14
@@ -82,7 +82,7 @@ def draw_shapes(
     height = float(figure.get_size_inches()[1])
     style.add_heading(figure, title, note, MARGIN, MARGIN)
     for index, shape in enumerate(shapes):
-        row, column = divmod(index, COLUMNS)
+        row, column = divmod(index, columns)
         left, above = MARGIN + column * (across + GAP), top + row * tall
         style.add_heading(figure, shape.title, shape.notes[0], left, above)
         for line, text in enumerate(shape.notes[1:], start=1):
