@@ -6,9 +6,9 @@ Each run is added to ``docs/tasks/runs.json`` (or ``--out FILE``) as soon as it 
 are in the record are not repeated unless ``--again`` is given. ``selector:A`` after ``--only``
 designs a load case of a task alone; ``straight-crane:free`` asks for the largest gain within the
 strain limit and without contact, ``:tolerant`` for all items over widths that are 20 % off,
-``:kept`` for 80 % of the gain over them, and ``:redundant`` for a loss of any strut that costs at
-most 30 %. ``--first N`` is the first seed. A table of medians is printed; times include the sheet
-of the refinement, not the compilation.
+``:kept`` for 80 % of the gain where all widths deviate by as much together, and ``:redundant`` for
+a loss of any strut that costs at most 30 %. ``--first N`` is the first seed. A table of medians is
+printed; times include the sheet of the refinement, not the compilation.
 """
 
 from __future__ import annotations
@@ -92,10 +92,9 @@ def task_named(name: str) -> Task:
         items = tuple(item for item in wanted.items if item.quantity in FREE)
         asked = replace(wanted, items=items)
     elif case in {"tolerant", "kept"}:
-        sizes = Tolerances(
-            width=WIDTH, node=NODE / task.part.scale, least_yield=LEAST_YIELD,
-            keep=KEEP if case == "kept" else 0.0,
-        )  # fmt: skip
+        sizes = Tolerances(width=WIDTH, node=NODE / task.part.scale, least_yield=LEAST_YIELD)
+        if case == "kept":
+            sizes = replace(sizes, each_width=0.0, least_yield=1.0, keep=KEEP)
         asked = replace(wanted, tolerances=sizes)
     elif case == "redundant":
         item = Item(quantity="strut_loss", at_most=STRUT_LOSS)

@@ -38,7 +38,7 @@ BEFORE_REFINEMENT = {"steps": 8_000}
 FIRST = RefinementSettings(evaluations=FIRST_EVALUATIONS, prints=0)
 """Settings of the first refinement of each design, without the sheet and random prints."""
 
-BATCHES = 2
+BATCHES = 3
 """Largest number of times as many designs as there are chains are refined further."""
 
 

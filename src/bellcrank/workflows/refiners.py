@@ -35,7 +35,8 @@ FIRST_EVALUATIONS = 100
 """Number of geometries that the refinement of each design of a search evaluates."""
 EVALUATIONS = 500
 """Number of further ones for the best designs."""
-SETTINGS = RefinementSettings(evaluations=EVALUATIONS)
+KEPT_EVALUATIONS = 1500
+"""The same where deviations are to keep a part of the efficiency."""
 JOINTS = (0.5, 1.5)
 """Lengths of the joints of a part in space, over those of its section, for which it is computed
 again: in the solid each joint has another length."""
@@ -114,9 +115,13 @@ def refine_designs(
     stop
         Event that stops all; there are fewer results then.
     settings
-        Settings of each refinement; `SETTINGS` by default.
+        Settings of each refinement; those of the designs that a search refines further by default.
     """
-    settings = settings or SETTINGS
+    if settings is None:
+        wanted = designs[0].problem.specification
+        tolerances = None if wanted is None else wanted.tolerances
+        is_kept = tolerances is not None and tolerances.keep > 0.0
+        settings = RefinementSettings(evaluations=KEPT_EVALUATIONS if is_kept else EVALUATIONS)
     workers = min(workers, len(designs))
     if workers > 1:
         refined: dict[int, Refinement] = {}
