@@ -44,5 +44,5 @@ function toleranceFields(editor: TaskEditor, tolerance: Tolerance): HTMLElement 
   return h("div", {},
     h("div", { class: "row" }, field("width", "All widths", "", "such as 20%"), field("each_width", "Each width", "", "standard deviation, 5%")),
     h("div", { class: "row" }, field("node", "Nodes", "mm", "0.1 mm"), field("angle", "Direction of the input", "°", "5 degrees")),
-    h("div", { class: "row" }, field("least_yield", "Prints that meet it at least", "", "such as 95%"), field("keep", "Keep of the motion gain", "", "empty: prints meet all items; such as 80%")));
+    h("div", { class: "row" }, field("keep", "Prints keep of the gain", "", "such as 80%; empty: they meet all items"), field("least_yield", "Prints that do so at least", "", "such as 95%")));
 }
