@@ -41,12 +41,12 @@ def selection() -> Selection:
     ("frames", "sheet", "sheets", "batches", "best"),
     [
         ([True] * 4, [BAD, GOOD, BAD, BAD], 1, 1, 1),
-        ([True] * 4, [BAD, BAD, BAD, GOOD], 1, BATCHES, 3),
-        ([True] * 4, [BAD] * 4, 1, BATCHES, 0),
-        ([True] * 4, [None] * 4, 1, BATCHES, 0),
+        ([True] * 4, [BAD, BAD, BAD, GOOD], 1, 2, 3),
+        ([True] * 6, [BAD] * 6, 1, BATCHES, 0),
+        ([True] * 6, [None] * 6, 1, BATCHES, 0),
         ([True] * 4, [None] * 4, 0, 1, 0),
         ([False] * 4, [None] * 4, 0, 1, 0),
-        ([False, True, True, True], [None, BAD, GOOD, BAD], 1, BATCHES, 2),
+        ([False, True, True, True], [None, BAD, GOOD, BAD], 1, 2, 2),
     ],
     ids=["first", "second", "none", "unstable", "without a sheet", "infeasible", "one"],
 )
