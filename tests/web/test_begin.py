@@ -14,8 +14,10 @@ from bellcrank.export.slicer import has_slicer
 from bellcrank.model import (
     Design,
     gallery_design,
+    human_design,
     pack_mask,
     problem_from_dict,
+    problem_to_dict,
     unpack_mask,
 )
 from bellcrank.part import PartSpec
@@ -182,13 +184,26 @@ def test_a_report_has_the_quantity_that_is_maximised(client: TestClient) -> None
     table = {**SIZED, "cases": [{**case, "outputs": [output]}]}
     built = client.post("/api/tasks/build", json={"task": table}).json()
     payload = next(each for each in built["items"] if each["label"] == "payload")
-    assert payload["wanted"] == "at least 0.00981 N (1 g)"
+    assert payload["wanted"] == "at least 0.00981 N (1 g), halves the motion"
     body = {"problem": built["problem"], "mask": full_mask(built["problem"]), "part": built["part"]}
     report = client.post("/api/report", json=body).json()
     (objective,) = report["objectives"]
     turn = report["figures"][0]["rotation_deg"]
     assert (objective["quantity"], objective["label"]) == ("rotation", "rotation")
     assert objective["reached"] in {f"{turn:.3g} deg", f"{-turn:.3g} deg"}
+
+
+def test_a_plate_counts_for_size_mass_and_screws(client: TestClient) -> None:
+    design = human_design("crane")
+    assert design is not None
+    body = {"problem": problem_to_dict(design.problem), "mask": design.mask_hex}
+    plain, gripped = (
+        client.post("/api/part", json={**body, **grips}).json()
+        for grips in ({}, {"plate": True, "screws": 2})
+    )
+    assert not plain["screws"]
+    assert len(gripped["screws"]) == 2
+    assert gripped["mass"] > plain["mass"]
 
 
 @pytest.mark.slow

@@ -366,7 +366,8 @@ export class Editor implements TaskEditor {
       });
     }
     const text = names.length ? `In the new lattice the nodes lie differently beside each other: ${names.join(", ")}. Check them in the drawing.` : "";
-    if (text) { clear(this.notice, text); announce(text); }
+    clear(this.notice, text);
+    if (text) announce(text);
   }
 
   private faultOf({ key, message }: { key: string; message: string }): Fault {

@@ -1,6 +1,6 @@
 // The panel beside a design: its specification, figures, part, files and next steps.
 
-import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, post, session, type Collection, type Comparison, type ItemState, type Part, type PartFigures, type PartReport, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
+import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, post, session, type Collection, type Comparison, type ItemState, type Part, type PartFigures, type PartReport, type Point, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
 import { compareAddress } from "./address";
 import { openTask } from "./begin";
 import { button, clear, count, download, duration, field, figure, h, number, select } from "./dom";
@@ -29,7 +29,7 @@ export interface Subject {
 }
 
 interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null; items: ItemState[] | null; figures: PartFigures[] | null }
-interface Remarks { size: [number, number, number]; volume: number; mass: number | null; stroke: number | null; remarks: string[]; touching: number[] }
+interface Remarks { size: [number, number, number]; volume: number; mass: number | null; stroke: number | null; remarks: string[]; touching: number[]; /** Centres of screw holes, mm. */ screws: Point[] }
 interface Print { minutes: number | null; layers: number; layer_mm: number; mass: number | null; slicer: string; profile: string }
 
 /** The level of the printed body, in which a specification is checked; that of a part in space takes minutes. */
@@ -44,6 +44,10 @@ const LOW_YIELD = 0.9;
 
 /** Effort of a search that begins with a design. */
 const CONTINUED = { steps: 8000, chains: 2 };
+
+interface Grips { plate: boolean; screws: number; pad: boolean; output_pad: boolean }
+/** The additions that were chosen, by design. */
+const gripsOf = new Map<string, Grips>();
 
 /** What was computed of a part. */
 interface Known { fems: Record<string, Fem | "running" | string>; tolerance: ToleranceFound | "running" | string | null; print: Print | "running" | string | null; shares: Record<string, number | null> }
@@ -75,7 +79,12 @@ export class Result {
   private readonly knownOf = new Map<string, Known>();
   private following = false;
   private closed = false;
-  private grips = { plate: false, screws: 0, pad: false, output_pad: false };
+  /** The part with the plate and the pads; a text says why it cannot be made. */
+  private gripped: Remarks | string | null = null;
+
+  /** Plate and pads, as they were chosen for this design before. */
+  private get grips(): Grips { return gripsOf.get(this.subject.mask) ?? { plate: false, screws: 0, pad: false, output_pad: false }; }
+  private set grips(given: Grips) { gripsOf.set(this.subject.mask, given); void this.describeGripped(); }
 
   constructor(private readonly subject: Subject) {
     this.part = partOf(subject);
@@ -93,6 +102,7 @@ export class Result {
     this.showPart();
     this.showFiles();
     void this.describe();
+    void this.describeGripped();
     void this.loadReport();
     void get<{ slicer: boolean }>("/about").then(({ slicer }) => { this.hasSlicer = slicer; this.showPart(); }, () => undefined);
     const resumed = this.resume().then(() => { if (this.isPart && !this.known.fems["frame"]) void this.validate("frame", false); });
@@ -221,7 +231,7 @@ export class Result {
     const last = columns.at(-1)?.items ?? null;
     const unstable = !first || first.efficiency === undefined || (report.specified && !report.items.frames);
     const isMet = last !== null && columns.every(({ items }) => items.every(({ met }) => met)) && !unstable;
-    const isSure = solid?.items && !this.hasLowYield;
+    const isSure = solid?.items && !this.hasLowYield && typeof this.known.tolerance === "object" && this.known.tolerance !== null;
     this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? (isSure ? "met" : "met pending") : "missed"}`;
     const pending = found === "running" ? `; ${words}, is being computed${this.shareText(level)}` : !solid ? `; not checked in ${words}` : !solid.items ? `; not stable in ${words}` : "";
     const by = solid?.items ? ` by frames and in ${words}` : " by frames";
@@ -248,7 +258,8 @@ export class Result {
   /** How many random prints meet all items, if the tolerance is known. */
   private printedText(): string {
     const { tolerance } = this.known;
-    return tolerance && typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} ${tolerance.met_words}.` : "";
+    if (!tolerance) return " Not checked over tolerances.";
+    return typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} ${tolerance.met_words}.` : "";
   }
 
   private showTable(): void {
@@ -330,7 +341,7 @@ export class Result {
     const place = (name: string): number => (order.includes(name) ? order.indexOf(name) : order.length);
     const shown = head!.map((name, k) => ({ name, k })).filter(({ name }) => name !== "wanted").sort((a, b) => place(a.name) - place(b.name));
     clear(this.toleranceBox, h("p", {}, sentence(tolerance.sentence)),
-      h("p", { class: "note" }, "Yield: the part of the random prints that meet an item; 95 %: the value that 95 of 100 prints reach. Then the worst values for widths 20 % narrower to 10 % wider, input directions 5° off, half and one and a half strokes, and of the prints."),
+      h("p", { class: "note" }, `Yield: the part of the random prints that meet an item; 95 %: the value that 95 of 100 prints reach. Then the worst values for ${tolerance.deviations}, and of the prints. “lost”: the part does not reach the full stroke; “more”: above the bound.`),
       h("div", { class: "report", tabindex: 0, role: "region", "aria-label": "Tolerance" },
         h("table", { class: "items tolerance" }, h("caption", {}, "Values as drawn, and in the scenarios"),
           h("thead", {}, h("tr", {}, ...shown.map(({ name }) => h("th", { scope: "col" }, name)))),
@@ -470,11 +481,42 @@ export class Result {
       });
       return h("label", { class: "tick" }, box, text);
     };
-    const screws = number(this.grips.screws, { min: 0, max: 12, step: 1 }, (value) => { this.grips = { ...this.grips, screws: Math.min(12, Math.max(0, Math.round(value))) }; });
+    const screws = number(this.grips.screws, { min: 0, max: 12, step: 1 }, (value) => {
+      this.grips = { ...this.grips, screws: Math.min(12, Math.max(0, Math.round(value))) };
+    });
     screws.dataset.key = "screws";
     return h("div", { class: "grips" }, tick("plate", "Fill the supports to a plate for clamping"),
       this.grips.plate && field("Screw holes, 3.4 mm", screws), tick("pad", "Fill the input to a pad for pushing"), tick("output_pad", "Fill the output to a pad for mounting"),
-      (this.grips.plate || this.grips.pad || this.grips.output_pad) && h("p", { class: "note" }, "A row of nodes at a side gets a plate outside of the part, which makes it larger than the size above."));
+      this.hasGrips && h("p", { class: "note", "data-gripped": "yes" }, this.grippedText()));
+  }
+
+  private get hasGrips(): boolean { return this.grips.plate || this.grips.pad || this.grips.output_pad; }
+
+  /** Size and mass of the part with plate and pads, as it is downloaded. */
+  private grippedText(): string {
+    const { gripped } = this;
+    if (gripped === null) return "Computing the size with these additions …";
+    if (typeof gripped === "string") return gripped;
+    const size = gripped.size.map((v) => figure(v, v % 1 ? 1 : 0)).join(" × ");
+    const mass = gripped.mass === null ? "" : `, ${figure(gripped.mass, 1)} g`;
+    const holes = gripped.screws.length ? ` Centres of the holes in the files: ${gripped.screws.map(([x, y]) => `(${figure(x, 1)}, ${figure(y, 1)})`).join(", ")} mm.` : "";
+    return `With these additions ${size} mm${mass}. A row of nodes at a side gets a plate outside of the part. They are in the files, not in the drawing and the print time.${holes}`;
+  }
+
+  private async describeGripped(): Promise<void> {
+    const { problem, mask } = this.subject;
+    const { grips } = this;
+    this.gripped = null;
+    if (!this.hasGrips) return;
+    let found: Remarks | string;
+    try {
+      found = await post<Remarks>("/part", { problem, mask, part: this.part, ...grips });
+    } catch (error) {
+      found = sentence((error as ServerError).message);
+    }
+    if (grips !== this.grips) return;
+    this.gripped = found;
+    this.showFiles();
   }
 
   private async downloadFile(suffix: string): Promise<void> {

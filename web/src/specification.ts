@@ -28,11 +28,19 @@ export function itemTable(columns: Column[], wanted: ItemState[] = []): HTMLElem
     h("td", {}, columns.length ? mark(item.met) : ""),
     h("th", { scope: "row" }, item.label, h("small", {}, item.wanted)),
     ...columns.map(({ items }) => h("td", {}, items[k]?.reached ?? "–")),
-    columns.length > 0 && h("td", { class: "more" }, item.margin === null ? "" : `${item.margin > 0 ? "+" : ""}${figure(100 * item.margin, 0)} %`)));
+    columns.length > 0 && h("td", { class: "more" }, marginText(columns.map(({ items }) => items[k]?.margin ?? null)))));
   return h("table", { class: "items" },
     h("caption", {}, "Specification"),
     columns.length > 0 && h("thead", {}, h("tr", {}, h("td"), h("td"), ...columns.map(({ title }) => h("th", { scope: "col" }, title)), h("th", { scope: "col" }, "margin"))),
     h("tbody", {}, ...rows));
+}
+
+/** The smallest margin of an item in all models. */
+function marginText(margins: (number | null)[]): string {
+  const known = margins.filter((each) => each !== null);
+  if (!known.length) return "";
+  const least = Math.min(...known);
+  return `${least > 0 ? "+" : ""}${figure(100 * least, 0)} %`;
 }
 
 function mark(met: boolean): HTMLElement {

@@ -25,6 +25,7 @@ from bellcrank.web.requests import (
     FemBody,
     FileBody,
     FileSuffix,
+    GripBody,
     MotionBody,
     PartBody,
     PlanBody,
@@ -93,9 +94,10 @@ async def get_sensitivity(body: DesignBody, state: State) -> dict[str, Any]:
 
 
 @router.post("/part")
-async def describe_part(body: PartBody, state: State) -> dict[str, Any]:
-    """Return size, mass and printability remarks of the part of a design."""
-    return await _computed(state, state.pools.thorough, slow_calls.part_summary, body, body.part)
+async def describe_part(body: GripBody, state: State) -> dict[str, Any]:
+    """Return size, mass and printability remarks of the part of a design, with its additions."""
+    pool = state.pools.thorough
+    return await _computed(state, pool, slow_calls.part_summary, body, body.part, body.grips)
 
 
 @router.post("/print")
@@ -155,13 +157,10 @@ async def list_computations(body: ComputationsBody, state: State) -> dict[str, A
 async def make_file(suffix: FileSuffix, body: FileBody, state: State) -> Response:
     """Return a file of a design for printing, cutting, viewing or simulation."""
     about = {"efficiency": body.efficiency, "provenance": body.provenance}
-    grips = {
-        "plate": body.plate, "screws": body.screws, "pad": body.pad, "output_pad": body.output_pad
-    }  # fmt: skip
     text = json.dumps(body.problem)
     pool = state.pools.thorough if page_files[suffix].quick else state.pools.slow
     content = await pool.call(
-        slow_calls.design_file, text, body.mask, f".{suffix}", body.part, about, grips
+        slow_calls.design_file, text, body.mask, f".{suffix}", body.part, about, body.grips
     )
     return Response(content, media_type=page_files[suffix].media_type)
 

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 def wanted_items(problem: Problem, part: PartSpec) -> list[dict[str, str]]:
     """Return name, label and bounds of the items of a specification, then its objectives.
 
-    Empty without a specification. The names of objectives begin with ``maximise:``.
+    Empty without a specification. The names of objectives begin with ``maximise:``. The last one
+    is ``tolerance``, if there are tolerances.
     """
     wanted = problem.specification
     if wanted is None:
@@ -39,6 +40,12 @@ def wanted_items(problem: Problem, part: PartSpec) -> list[dict[str, str]]:
                 "label": item_label(each.item, problem),
                 "wanted": f"as {size} as possible",
             }
+        )
+    if wanted.tolerances is not None:
+        share, keep = wanted.tolerances.least_yield, wanted.tolerances.keep
+        found = f"keep {keep:.0%} of the gain" if keep else "meet all items"
+        items.append(
+            {"name": "tolerance", "label": "random prints", "wanted": f"{share:.0%} {found}"}
         )
     return items
 
@@ -79,10 +86,11 @@ def item_states(
 
 def _texts(item: Item, problem: Problem, units: ProblemUnits) -> dict[str, str]:
     """Return name, label and bounds of an item."""
+    halved = ", halves the motion" if item.quantity in CARRIED else ""
     return {
         "name": item.name,
         "label": item_label(item, problem),
-        "wanted": wanted_text(item, units) + _grams(item, item.at_least, units),
+        "wanted": wanted_text(item, units) + _grams(item, item.at_least, units) + halved,
     }
 
 

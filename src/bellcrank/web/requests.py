@@ -94,19 +94,30 @@ class PartBody(DesignBody):
     part: dict[str, Any] = Field(default_factory=dict)
 
 
-class FileBody(PartBody):
-    """A design to be written as a file.
+class GripBody(PartBody):
+    """A design as a part, with additions for clamping and pushing.
 
     In the plane the supports can be filled to a plate with screw holes, and the input and the
     output to pads.
     """
 
-    efficiency: float | None = None
-    provenance: dict[str, Any] = Field(default_factory=dict)
     plate: bool = False
     screws: int = Field(default=0, ge=0, le=12)
     pad: bool = False
     output_pad: bool = False
+
+    @property
+    def grips(self) -> dict[str, Any]:
+        """Arguments of `bellcrank.workflows.fabricate.Grips`."""
+        names = ("plate", "screws", "pad", "output_pad")
+        return {name: getattr(self, name) for name in names}
+
+
+class FileBody(GripBody):
+    """A design to be written as a file."""
+
+    efficiency: float | None = None
+    provenance: dict[str, Any] = Field(default_factory=dict)
 
 
 class FemBody(PartBody):

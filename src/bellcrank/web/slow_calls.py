@@ -152,8 +152,26 @@ class ShareFile:
                 Path(self._path).write_text(f"{share:.3f}", encoding="ascii")
 
 
-def part_summary(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
-    """Return size, mass and stroke of a part, and remarks on its printability."""
+CIRCLE = 2
+"""Number of arcs of a screw hole."""
+
+
+def part_summary(
+    text: str, mask: str, part: dict[str, Any], grips: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return size, mass and stroke of a part, and remarks on its printability.
+
+    Parameters
+    ----------
+    grips
+        Arguments of `bellcrank.workflows.fabricate.Grips`: additions to the part.
+
+    Returns
+    -------
+    dict
+        Lengths in mm, ``volume`` in cm³, ``mass`` in g; ``screws``, the centres of screw holes in
+        the coordinates of the files.
+    """
     from bellcrank.part import PartSpec
     from bellcrank.workflows.fabricate import (
         Grips,
@@ -165,8 +183,10 @@ def part_summary(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     )
 
     spec = PartSpec.from_dict(part)
-    bundle = bundle_of(design_of(text, mask), spec, Grips(), layer=0.32)
+    bundle = bundle_of(design_of(text, mask), spec, Grips(**(grips or {})), layer=0.32)
     size, volume = size_and_volume(bundle)
+    loops = [] if bundle.shape is None else bundle.shape.holes
+    screws = [loop.points.mean(axis=0) for loop in loops if len(loop.points) == CIRCLE]
     contacts = contacts_of(bundle.part)
     mass = volume * bundle.part.material.density / 1000.0
     return {
@@ -176,6 +196,7 @@ def part_summary(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
         "stroke": bundle.part.stroke if math.isfinite(bundle.part.stroke) else None,
         "remarks": print_warnings(bundle, profile_for(_profile_name(spec), spec), contacts),
         "touching": np.unique(contacts.pairs).tolist(),
+        "screws": sorted(centre.round(2).tolist() for centre in screws),
     }
 
 
@@ -234,6 +255,7 @@ def tolerance(text: str, mask: str, part: dict[str, Any], share: str = "") -> di
     from bellcrank.part import PartSpec
     from bellcrank.workflows.tolerance import (
         compute_tolerance,
+        deviation_words,
         deviations_of,
         met_words,
         tolerance_rows,
@@ -256,6 +278,7 @@ def tolerance(text: str, mask: str, part: dict[str, Any], share: str = "") -> di
         "prints": len(prints),
         "met": sum(report.tolerance.results[number].met for number in prints),
         "met_words": met_words(report),
+        "deviations": deviation_words(report.deviations),
         "rows": tolerance_rows(report),
         "losses": {"beams": list(losses), "cost": [finite(each) for each in losses.values()]},
     }

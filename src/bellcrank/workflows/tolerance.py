@@ -307,6 +307,16 @@ def tolerance_sentence(report: ToleranceReport) -> str:
     return sentence
 
 
+def deviation_words(deviations: Deviations) -> str:
+    """Return the scenarios besides prints and lost struts in words."""
+    sizes = deviations.tolerances
+    thin = max(sizes.width, deviations.thin)
+    return (
+        f"widths {thin:.0%} narrower to {sizes.width:.0%} wider, input directions "
+        f"{sizes.angle:g}\u00b0 off, and {deviations.shortest:g} and {deviations.longest:g} strokes"
+    )
+
+
 def met_words(report: ToleranceReport) -> str:
     """Return what random prints are to do, as a verb with its object."""
     keep = report.deviations.tolerances.keep

@@ -169,6 +169,7 @@ def test_screws_are_far_apart_and_well_inside(count: int) -> None:
     apart = [math.dist(a, b) for k, a in enumerate(places) for b in places[:k]]
     assert min(apart, default=31.0) > {1: 30.0, 2: 30.0, 3: 14.0, 4: 9.9}[count]
     assert drilled(SHEET, places, 3.0, 1.5).hole_count == count
+    assert np.ptp(places[:, 1]) < 1e-9  # in one row
 
 
 def test_screws_stay_in_the_plate_that_they_are_for() -> None:

@@ -21,6 +21,8 @@ _ACROSS = 120
 _INSIDE = 0.75
 """Preferred clearance of screws, as a fraction of the largest clearance in the plate."""
 
+_NARROW = 0.5
+"""Width over length of a region up to which screws are in one row."""
 _SWEEPS = 50
 """Largest number of times that each screw is placed again."""
 
@@ -132,9 +134,11 @@ def screw_positions(
     least = radius + wall
     deepest = float(depth.max(initial=-np.inf))
     for limit in (max(least, _INSIDE * deepest), least):
-        points = _far_apart(grid[depth >= limit], count)
-        if _are_apart(points, count, diameter + wall):
-            return points
+        deep = grid[depth >= limit]
+        for candidates in (_middle_row(deep), deep):
+            points = _far_apart(candidates, count)
+            if _are_apart(points, count, diameter + wall):
+                return points
     raise InvalidSettings(
         f"count: no room for {count} screw holes of {diameter:g} mm with {wall:g} mm of wall; the "
         f"largest circle in the plate is {2.0 * max(deepest, 0.0):.3g} mm wide; choose a "
@@ -199,6 +203,20 @@ def _distance(loop: Loop, points: Reals) -> Reals:
             away = np.where(ahead <= np.abs(turn), radial, ends)
         nearest = np.minimum(nearest, away)
     return nearest
+
+
+def _middle_row(points: Reals) -> Reals:
+    """Return the points of the row in the middle of a long region; all of another region."""
+    if not len(points):
+        return points
+    low, high = points.min(axis=0), points.max(axis=0)
+    across = int(np.argmin(high - low))
+    if (high - low)[across] > _NARROW * (high - low)[1 - across]:
+        return points
+    away = np.abs(points[:, across] - 0.5 * (low + high)[across])
+    height = points[int(np.argmin(away)), across]
+    row: Reals = points[np.abs(points[:, across] - height) <= 1e-9 * (1.0 + away.max())]
+    return row
 
 
 def _far_apart(points: Reals, count: int) -> Reals:
