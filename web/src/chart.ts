@@ -94,7 +94,7 @@ export class Chart {
     for (const part of W > 480 ? [0, 0.25, 0.5, 0.75, 1] : [0, 0.5, 1]) {
       const at = Math.round(part * this.steps);
       parts.push(s("text", { class: "tick", x: x(at), y: H - 8, "text-anchor": part === 1 ? "end" : part ? "middle" : "start" },
-        part === 1 ? `${at.toLocaleString("en")} steps` : at.toLocaleString("en")));
+        part === 1 ? `${at.toLocaleString("en")} steps of each chain` : at.toLocaleString("en")));
     }
     for (const { title, value } of levels) {
       const at = y(value);

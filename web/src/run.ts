@@ -47,7 +47,7 @@ export class RunPage {
     if (run.comparison) this.chart.compare(run.comparison.title, run.comparison.efficiency);
     this.stage.append(this.switcher, this.paper);
     const card = h("section", { class: "card", "aria-label": "Progress of the search" }, this.curveTitle, this.chart.svg, this.curveNote);
-    this.curveTitle.textContent = run.problem.specification ? "Objective along the search, before refinement" : "Efficiency along the search";
+    this.curveTitle.textContent = !run.problem.specification ? "Efficiency along the search" : `${this.hasObjective ? "Objective" : "Smallest margin of the items"} along the search, before refinement`;
     card.hidden = run.refine;
     this.watch = h("aside", { class: "panel", "aria-label": "Search" },
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Search"), this.live, this.items, this.controls, this.trouble));
@@ -197,7 +197,7 @@ export class RunPage {
     const phases = ["search", "verification", ...(specified ? ["refinement"] : [])];
     const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${done.toLocaleString("en")} geometries`)]] : [
       ...(running ? [["phase", `${phases.indexOf(phase) + 1} of ${phases.length}: ${phase}`]] as [string, string][] : []),
-      [specified ? "largest objective of the search" : "best so far", this.bestText(run)],
+      [!specified ? "best so far" : this.hasObjective ? "largest objective of the search" : "largest margin of the search", this.bestText(run)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],
       ...(running && phase === "search" ? [["speed", this.update?.speed ? `${Math.round(this.update.speed).toLocaleString("en")} steps/s` : "starting …"], ["left of this phase", duration(this.update?.left)]] as [string, string][] : []),
       ...(running && tried && !refined ? [["candidates verified", `${tried[0]} of at most ${tried[1]}`]] as [string, string][] : []),
@@ -227,6 +227,9 @@ export class RunPage {
         h("span", {}, `${objective ? `${objective.label} of the ` : ""}${this.stateText(run, value !== null, done)}`));
     }
   }
+
+  /** Whether a quantity is maximised; else the smallest margin of the items is. */
+  private get hasObjective(): boolean { return Boolean(this.run.problem.specification?.maximise?.length); }
 
   /** Size of a unit of the objective: mm for a travel. */
   private get unit(): number {
