@@ -98,9 +98,9 @@ def test_the_kept_efficiency_has_the_derivative_of_differences() -> None:
     result = evaluator.evaluate(thin)
     ratio = result.efficiency / drawn.efficiency
     assert found.constraints[0] == pytest.approx((1.0 - ratio) / 0.1 - 1.0, abs=1e-6)
-    assert result.kept == pytest.approx(ratio / 0.9 - 1.0)
+    assert result.reserve == pytest.approx(ratio / 0.9 - 1.0)
     assert result.met == (ratio >= 0.9)
-    assert result.margin == result.kept
+    assert result.margin == result.reserve
     way, step = np.random.default_rng(0).normal(size=variables.count), 1e-6
     ahead, behind = (rows.evaluate(sign * step * way) for sign in (1.0, -1.0))
     assert ahead is not None

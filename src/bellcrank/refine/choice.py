@@ -199,7 +199,7 @@ def _objective(result: ScenarioResult, scales: Sequence[float]) -> float:
     """Return the smallest objective, or margin without any; minus infinity if the path is lost."""
     if not result.is_stable:
         return -math.inf
-    if result.kept is not None:
+    if result.reserve is not None:
         return math.inf  # that of the design as drawn counts
     if not scales:
         return result.margin

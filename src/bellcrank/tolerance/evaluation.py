@@ -32,7 +32,7 @@ class ScenarioResult(NamedTuple):
         Results of the items of the specification; empty without a stable path.
     objectives
         Values of the objectives, in the units of the problem; nan without a stable path.
-    kept
+    reserve
         Efficiency over the smallest one that is tolerated (`Tolerances.keep`), less 1; None if all
         items are to be met in place of it.
     """
@@ -41,7 +41,7 @@ class ScenarioResult(NamedTuple):
     efficiency: float
     items: list[ItemResult]
     objectives: list[float]
-    kept: float | None = None
+    reserve: float | None = None
 
     @property
     def is_stable(self) -> bool:
@@ -51,8 +51,8 @@ class ScenarioResult(NamedTuple):
     @property
     def met(self) -> bool:
         """Whether a stable path leads to the full stroke, and what is tolerated is met."""
-        if self.kept is not None:
-            return self.is_stable and self.kept >= 0.0
+        if self.reserve is not None:
+            return self.is_stable and self.reserve >= 0.0
         return self.is_stable and all(each.met for each in self.items)
 
     @property
@@ -60,8 +60,8 @@ class ScenarioResult(NamedTuple):
         """The smallest margin of what is tolerated; minus infinity without a stable path."""
         if not self.is_stable:
             return -math.inf
-        if self.kept is not None:
-            return self.kept
+        if self.reserve is not None:
+            return self.reserve
         return min((each.margin for each in self.items), default=math.inf)
 
 
@@ -129,10 +129,10 @@ class ScenarioEvaluator:
             response = evaluator.evaluate(mask)
         if not response.is_admissible:
             return self._lost(response.status.label)
-        kept = response.efficiency / self._least - 1.0 if self._least > 0.0 else None
+        reserve = response.efficiency / self._least - 1.0 if self._least > 0.0 else None
         return ScenarioResult(
             response.status.label, response.efficiency, evaluator.results(),
-            evaluator.objective_values(), kept,
+            evaluator.objective_values(), reserve,
         )  # fmt: skip
 
     def _lost(self, status: str) -> ScenarioResult:

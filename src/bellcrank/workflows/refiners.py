@@ -35,6 +35,7 @@ FIRST_EVALUATIONS = 100
 """Number of geometries that the refinement of each design of a search evaluates."""
 EVALUATIONS = 500
 """Number of further ones for the best designs."""
+SETTINGS = RefinementSettings(evaluations=EVALUATIONS)
 KEPT_EVALUATIONS = 1500
 """The same where deviations are to keep a part of the efficiency."""
 JOINTS = (0.5, 1.5)
@@ -121,7 +122,7 @@ def refine_designs(
         wanted = designs[0].problem.specification
         tolerances = None if wanted is None else wanted.tolerances
         is_kept = tolerances is not None and tolerances.keep > 0.0
-        settings = RefinementSettings(evaluations=KEPT_EVALUATIONS if is_kept else EVALUATIONS)
+        settings = replace(SETTINGS, evaluations=KEPT_EVALUATIONS) if is_kept else SETTINGS
     workers = min(workers, len(designs))
     if workers > 1:
         refined: dict[int, Refinement] = {}
