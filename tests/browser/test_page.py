@@ -412,6 +412,13 @@ def test_the_tolerance_of_a_design_is_shown_and_it_is_compared_with_another(
     page.locator(".items.tolerance tbody tr").first.wait_for()
     assert page.locator('.colour input[value="loss"]').is_checked()
     assert page.locator(".player .beam.effect-3").get_attribute("d")
+    page.get_by_label("Fill the supports to a plate for clamping").check()
+    page.locator('[data-key="screws"]').fill("2")
+    page.keyboard.press("Tab")
+    note = page.locator("[data-gripped]", has_text="Centres of the holes")
+    note.wait_for()
+    assert re.search(r"\d × \d+(\.\d)? × 5\.1 mm, \d+\.\d g", note.inner_text())
+    assert note.inner_text().split("Centres")[1].count("(") == 2
     page.get_by_label("Compare with").select_option("builtin/human-crane")
     table = page.locator(".compare .figures.part")
     table.wait_for()

@@ -39,8 +39,8 @@ const SPACE_BODY = { level: "solid", title: "3D solid", words: "the 3D solid, th
 /** Time between two questions after what is computed, milliseconds. */
 const SHARE_PERIOD = 2000;
 
-/** Part of the random prints that meet all items, below which a verdict is not green. */
-const LOW_YIELD = 0.9;
+/** Smallest part of the random prints that meet all items, with which a verdict is green. */
+const LEAST_YIELD = 0.9;
 
 /** Effort of a search that begins with a design. */
 const CONTINUED = { steps: 8000, chains: 2 };
@@ -231,7 +231,7 @@ export class Result {
     const last = columns.at(-1)?.items ?? null;
     const unstable = !first || first.efficiency === undefined || (report.specified && !report.items.frames);
     const isMet = last !== null && columns.every(({ items }) => items.every(({ met }) => met)) && !unstable;
-    const isSure = solid?.items && !this.hasLowYield && typeof this.known.tolerance === "object" && this.known.tolerance !== null;
+    const isSure = solid?.items && this.hasYield;
     this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? (isSure ? "met" : "met pending") : "missed"}`;
     const pending = found === "running" ? `; ${words}, is being computed${this.shareText(level)}` : !solid ? `; not checked in ${words}` : !solid.items ? `; not stable in ${words}` : "";
     const by = solid?.items ? ` by frames and in ${words}` : " by frames";
@@ -249,10 +249,10 @@ export class Result {
     clear(this.advice, defect && h("p", {}, defect), defect && h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text))));
   }
 
-  /** Whether more than one in ten random prints miss an item. */
-  private get hasLowYield(): boolean {
+  /** Whether the tolerance is known, and hardly any random print misses it. */
+  private get hasYield(): boolean {
     const { tolerance } = this.known;
-    return tolerance !== null && typeof tolerance === "object" && tolerance.met < LOW_YIELD * tolerance.prints;
+    return typeof tolerance === "object" && tolerance !== null && tolerance.met >= LEAST_YIELD * tolerance.prints;
   }
 
   /** How many random prints meet all items, if the tolerance is known. */
@@ -360,6 +360,7 @@ export class Result {
       this.part = { ...this.part, ...changes };
       this.showTolerance();
       void this.describe();
+      void this.describeGripped();
       void this.loadReport();
       void this.resume();
     };

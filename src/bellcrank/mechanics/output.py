@@ -161,17 +161,15 @@ def deformation_of(positions: NDArray[np.float64], displacement: NDArray[np.floa
     """
     from scipy.spatial.transform import Rotation
 
-    rotation = np.radians(best_fit_rotation(positions, displacement))
-    if np.isnan(rotation).any():
+    if len(positions) < 2:
         return math.nan
-    in_plane = positions.shape[1] == 2
-    vector = np.array([0.0, 0.0, float(rotation)]) if in_plane else rotation
+    rotation = best_fit_rotation(positions, displacement)
     dimension = positions.shape[1]
-    turn = Rotation.from_rotvec(vector).as_matrix()[:dimension, :dimension]
+    vector = rotation if dimension == 3 else [0.0, 0.0, float(rotation)]
+    turn = Rotation.from_rotvec(vector, degrees=True).as_matrix()[:dimension, :dimension]
     before = positions - positions.mean(axis=0)
-    after = positions + displacement
-    apart = after - after.mean(axis=0) - before @ turn.T
-    return float(np.linalg.norm(apart, axis=1).max())
+    after = before + displacement - displacement.mean(axis=0)
+    return float(np.linalg.norm(after - before @ turn.T, axis=1).max())
 
 
 def turned_positions(

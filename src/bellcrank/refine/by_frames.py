@@ -228,7 +228,7 @@ class FrameRefinement:
 
         def rows_of(scenario: Scenario) -> RowEvaluator | KeptRows:
             least = self.choice.least_kept(scenario)
-            if least > 0.0:
+            if least is not None:
                 return KeptRows(*of_design, least, scenario)
             return RowEvaluator(*of_design, in_scenarios, stable, models, scenario)
 

@@ -112,14 +112,15 @@ class ScenarioChoice:
         """Whether only the design as drawn counts."""
         return self.tolerances is None and self.largest_loss is None
 
-    def least_kept(self, scenario: Scenario) -> float:
+    def least_kept(self, scenario: Scenario) -> float | None:
         """Return the smallest efficiency in a scenario over that as drawn.
 
-        0 if items are to be met there in place of it.
+        None if items are to be met there in place of it.
         """
         if scenario.missing is not None:
-            return 1.0 - (1.0 if self.largest_loss is None else self.largest_loss)
-        return 0.0 if self.tolerances is None else self.tolerances.keep
+            assert self.largest_loss is not None
+            return 1.0 - self.largest_loss
+        return (self.tolerances.keep if self.tolerances is not None else 0.0) or None
 
     @property
     def allowed(self) -> int:

@@ -127,7 +127,7 @@ def reduced_rows(
 class KeptRows:
     """The constraint that the efficiency in a scenario is at least a part of that as drawn.
 
-    The path in the scenario is stable; items are not constraints there.
+    Items are not constraints in the scenario. The stability of the path is, unless a strut is lost.
 
     Parameters
     ----------
@@ -145,23 +145,26 @@ class KeptRows:
         self, variables: Variables, mask: NDArray[np.bool_], least: float, scenario: Scenario
     ) -> None:
         of_gain = replace(variables, problem=_with_gain(variables.problem))
-        self.least, self.name, self.key = least, "kept", (0,)
+        self.least, self.beam = least, scenario.missing
         self.has_objectives = True
-        if scenario.missing is None:
+        if self.beam is None:
             deviating = RowEvaluator(of_gain, mask, [], scenario=scenario, kinds="stability")
         else:
-            self.name, self.key, without = "strut_loss", (scenario.missing,), mask.copy()
-            without[scenario.missing] = False
+            without = mask.copy()
+            without[self.beam] = False
             deviating = RowEvaluator(of_gain, without, [], kinds="objectives")
         self.parts = RowEvaluator(of_gain, mask, [], kinds="objectives"), deviating
 
     @property
     def soft_states(self) -> int:
-        """Number of states that were soft or unstable in any geometry, and are constraints."""
-        return self.parts[1].soft_states
+        """Number of states that were soft or unstable in any geometry, and are constraints.
+
+        None without a strut.
+        """
+        return self.parts[1].soft_states if self.beam is None else 0
 
     def maximise_margins(self) -> None:
-        """Make the margin the objective."""
+        """Make the margin of the efficiency the objective."""
         self.has_objectives = False
 
     def evaluate(self, vector: Values, *, slopes: bool = False) -> Rows | None:
@@ -178,8 +181,8 @@ class KeptRows:
         return Rows(
             -loss[:count],
             np.concatenate([loss, found.constraints]),
-            (self.name, *found.names),
-            (self.key, *((-1, *key) for key in found.keys)),
+            ("kept" if self.beam is None else "strut_loss", *found.names),
+            ((0 if self.beam is None else self.beam,), *found.keys),
             -by_vector[:count],
             np.concatenate([by_vector, found.constraint_slopes]),
         )

@@ -256,7 +256,8 @@ def _domain_rows(problem: Problem, beams: NDArray[np.int64]) -> ShapeRows:
     beam, share, width = beam[found.point], share[found.point], width[found.point]
     ends, weights, is_held = ends[found.point], weights[found.point], is_held[found.point]
     # A held end closer to the boundary than half of the section is as far as that.
-    least = 0.5 * problem.section.width if problem.section is not None else 0.0
+    assert problem.section is not None
+    least = 0.5 * problem.section.width
     is_held &= found.value < least
     distance = np.where(is_held, least, found.value)
     value = 0.5 - distance / width

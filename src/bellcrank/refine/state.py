@@ -84,7 +84,7 @@ class State:
 
     @property
     def missed_in_sheet(self) -> float:
-        """Sum of these violations; infinite where the sheet is not on the same path."""
+        """The `sheet_violation`; infinite where the sheet is not on the same path."""
         return self.sheet_violation if self.is_on_path_of_sheet else math.inf
 
     @property

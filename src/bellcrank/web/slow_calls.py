@@ -152,10 +152,6 @@ class ShareFile:
                 Path(self._path).write_text(f"{share:.3f}", encoding="ascii")
 
 
-CIRCLE = 2
-"""Number of arcs of a screw hole."""
-
-
 def part_summary(
     text: str, mask: str, part: dict[str, Any], grips: dict[str, Any] | None = None
 ) -> dict[str, Any]:
@@ -183,10 +179,12 @@ def part_summary(
     )
 
     spec = PartSpec.from_dict(part)
-    bundle = bundle_of(design_of(text, mask), spec, Grips(**(grips or {})), layer=0.32)
+    added = Grips(**(grips or {}))
+    bundle = bundle_of(design_of(text, mask), spec, added, layer=0.32)
     size, volume = size_and_volume(bundle)
-    loops = [] if bundle.shape is None else bundle.shape.holes
-    screws = [loop.points.mean(axis=0) for loop in loops if len(loop.points) == CIRCLE]
+    holes = () if bundle.shape is None else bundle.shape.holes
+    # Those of screws are the last ones.
+    screws = [hole.points.mean(axis=0) for hole in holes[len(holes) - added.screws :]]
     contacts = contacts_of(bundle.part)
     mass = volume * bundle.part.material.density / 1000.0
     return {

@@ -28,7 +28,7 @@ _SWEEPS = 50
 
 
 def drilled(outline: Outline, centres: ArrayLike, diameter: float, wall: float) -> Outline:
-    """Return an outline with circular holes.
+    """Return an outline with circular holes, which are the last ones of its holes.
 
     Parameters
     ----------
