@@ -144,22 +144,47 @@ def robust_table(runs: list[dict[str, Any]]) -> Iterator[str]:
     whether the sheet does; and the time of the design.
     """
     for run in runs:
-        if "tolerance" not in run:
+        task, _, kind = run["task"].partition(":")
+        if kind != "tolerant":
             continue
         whole, common = run["tolerance"][""], run["tolerance"]["without_own_widths"]
-
-        def least(found: dict[str, Any], kind: str) -> str:
-            values = [each["worst"][kind] for each in found["objectives"]]
-            return "lost" if None in values else f"{min(values):.3g}"
-
         nominal = min(each["nominal"] for each in whole["objectives"])
         cells = [
-            f"`{run['task'].partition(':')[0]}`", f"{nominal:.3g}",
-            *(least(whole, kind) for kind in ("widths", "input", "print")),
-            f"{whole['yield']:.1%}", least(common, "print"), f"{common['yield']:.1%}",
+            f"`{task}`", f"{nominal:.3g}", *_worst(whole),
+            f"{whole['yield']:.1%}", _worst(common)[-1], f"{common['yield']:.1%}",
             "yes" if run["met_in_sheet"] else "no", f"{run['seconds']:.0f} s",
         ]  # fmt: skip
         yield f"| {' | '.join(cells)} |"
+
+
+def kept_table(robust: list[dict[str, Any]], runs: list[dict[str, Any]]) -> Iterator[str]:
+    """Yield the rows of the table of ``TASK:kept`` (`benchmarks.tasks`) in Markdown.
+
+    The gain as drawn, the smallest over widths, directions and random prints, the part of the
+    prints that keeps its part, whether the sheet meets all items, the cost against the same seed
+    without tolerances, and the time of the design.
+    """
+    free = {(run["task"], run["seed"]): run.get("efficiency") for run in runs}
+    for run in robust:
+        task, _, kind = run["task"].partition(":")
+        if kind != "kept":
+            continue
+        found, cost = run["tolerance"][""], 1.0 - run["efficiency"] / free[task, run["seed"]]
+        cells = [
+            f"`{task}`", f"{run['seed']}", f"{run['efficiency']:.2f}", *_worst(found),
+            f"{found['yield']:.1%}", "yes" if run["met_in_sheet"] else "no",
+            "none" if cost <= 0.0 else f"{cost:.0%}", f"{run['seconds']:.0f} s",
+        ]  # fmt: skip
+        yield f"| {' | '.join(cells)} |"
+
+
+def _worst(found: dict[str, Any]) -> list[str]:
+    """Return the smallest objective over widths, directions and prints as texts."""
+    values = [
+        [each["worst"][kind] for each in found["objectives"]]
+        for kind in ("widths", "input", "print")
+    ]
+    return ["lost" if None in each else f"{min(each):.3g}" for each in values]
 
 
 def chosen_runs() -> dict[str, dict[str, Any]]:

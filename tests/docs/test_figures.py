@@ -24,7 +24,7 @@ from benchmarks.size import table as size_rows
 from benchmarks.space import cost_rows, mesh_rows, task_rows
 from benchmarks.surrogate_long_runs import table_row as long_run_row
 from benchmarks.tasks import counts, summary
-from benchmarks.tolerance import redundant_table, robust_table
+from benchmarks.tolerance import kept_table, redundant_table, robust_table
 from benchmarks.tolerance import table as tolerance_rows
 from reproduction.frame_benchmarks import tables as frame_benchmarks
 from reproduction.measured import tables as measured
@@ -73,6 +73,7 @@ def sizes() -> Rows:
 def tolerances() -> Rows:
     yield from tolerance_rows(read("tolerance")["runs"])
     yield from robust_table(read("tasks/robust")["runs"])
+    yield from kept_table(read("tasks/robust")["runs"], recorded_runs())
     yield from redundant_table(read("tasks/robust")["runs"], recorded_runs())
 
 
