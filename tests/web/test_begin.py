@@ -11,6 +11,7 @@ import pytest
 import trimesh
 
 from bellcrank.export.slicer import has_slicer
+from bellcrank.mechanics import VERIFICATION_INCREMENT, model_evaluator
 from bellcrank.model import (
     Design,
     gallery_design,
@@ -252,6 +253,34 @@ def test_struts_that_touch_are_named(client: TestClient, crane: dict[str, Any]) 
         assert len(contacts.pairs) == pairs
         assert summary["touching"] == np.unique(contacts.pairs).tolist()
         assert any("touch" in each for each in summary["remarks"])
+
+
+def test_the_space_of_a_moving_part_and_the_outline_of_its_plate_are_returned(
+    client: TestClient,
+) -> None:
+    spec = PartSpec()
+    entry = client.get("/api/gallery/builtin/machine-crane").json()
+    body = {"problem": entry["problem"], "mask": entry["mask"], "part": spec.to_dict()}
+    summary = client.post("/api/part", json=body).json()
+    assert summary["outline"] == []
+    design = gallery_design("machine", "crane")
+    assert design is not None
+    part = spec.of(design)
+    response = model_evaluator(part.design.problem).evaluate(design.mask, VERIFICATION_INCREMENT)
+    ends = (part.positions + part.scale * response.displacement)[part.struts]
+    low = np.minimum(ends.min(axis=(0, 1)), part.positions[part.struts].min(axis=(0, 1)))
+    high = np.maximum(ends.max(axis=(0, 1)), part.positions[part.struts].max(axis=(0, 1)))
+    assert summary["swept"][0] == pytest.approx(high[0] - low[0] + spec.width, abs=0.5)
+    assert summary["swept"][0] > summary["size"][0] + 20.0
+    assert summary["swept"][1] >= summary["size"][1] - 0.1
+    held = client.post("/api/part", json={**body, "plate": True, "screws": 2}).json()
+    loops = [np.array(loop) for loop in held["outline"]]
+    span = np.ptp(np.concatenate(loops), axis=0)
+    assert span == pytest.approx(held["size"][:2], abs=0.1)
+    # The last loops are the holes of the screws.
+    assert sorted(loop.mean(axis=0).tolist() for loop in loops[-2:]) == pytest.approx(
+        np.array(held["screws"]), abs=0.1
+    )
 
 
 def test_a_part_of_an_own_material_has_remarks(client: TestClient, crane: dict[str, Any]) -> None:

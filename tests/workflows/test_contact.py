@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from bellcrank.export import Export
 from bellcrank.fem import FemSettings, levels
+from bellcrank.fem.contact import centre_lines, find_contacts
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Status
 from bellcrank.model import Design, Input, Lattice, Output, Problem, Supports
 from bellcrank.part import PartSpec, frame_problem
@@ -41,6 +43,22 @@ def test_a_frame_reports_contact_in_the_middle_of_the_stroke(sweep: Design) -> N
     assert 0.35 < contact["first_at"] < 0.65
     assert 0.5 < contact["overlap_mm"] <= 1.0
     assert f"{contact['first_at']:.0%} of the stroke" in " ".join(analysis.warnings)
+
+
+def test_pairs_that_meet_in_a_node_are_named() -> None:
+    # A fold: the second strut turns onto the first, with which it shares a node.
+    rest = centre_lines(np.array([[[0.0, 0.0], [10.0, 0.0]], [[10.0, 0.0], [10.0, 10.0]]]))
+    folded = centre_lines(np.array([[[0.0, 0.0], [10.0, 0.0]], [[10.0, 0.0], [0.2, 1.0]]]))
+    fold = find_contacts(np.array([3, 5]), rest, [(0.5, folded)], 2.0)
+    assert fold.pairs.tolist() == [[3, 5]]
+    assert fold.meets.tolist() == [True]
+    assert fold.message.startswith("a pair of struts that meet in a node touches or crosses")
+    three = np.concatenate([rest, centre_lines(np.array([[[0.0, 4.0], [8.0, 4.0]]]))])
+    moved = np.concatenate([folded, centre_lines(np.array([[[0.0, 1.0], [8.0, 1.0]]]))])
+    both = find_contacts(np.array([3, 5, 8]), three, [(0.5, moved)], 2.0)
+    assert both.pairs.tolist() == [[3, 5], [3, 8], [5, 8]]
+    assert both.meets.tolist() == [True, False, False]
+    assert "3 pairs of struts touch or cross, 1 of struts that meet in a node" in both.message
 
 
 def test_a_frame_with_contact_along_the_stroke_has_a_fault(sweep: Design) -> None:

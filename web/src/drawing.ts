@@ -59,6 +59,8 @@ export class Drawing implements LatticeDrawing {
   box: Box = { x: 0, y: 0, w: 10, h: 10 };
   private view: Box = this.box;
   private readonly dims = s("g", { class: "dims", "aria-hidden": "true" });
+  private readonly outline = s("path", { class: "printed", "fill-rule": "evenodd", "aria-hidden": "true" });
+  private readonly screws = s("path", { class: "screw", "aria-hidden": "true" });
   private readonly path_ = s("path", { class: "output-path", "aria-hidden": "true" });
 
   constructor(label: string) {
@@ -94,12 +96,17 @@ export class Drawing implements LatticeDrawing {
 
   /** Enlarge the view, if necessary, so that displaced beams are inside. */
   makeRoom(beams: ArrayLike<number>, displacement: ArrayLike<number>, margin = 0.6): void {
+    this.enlarge(Array.from(beams).flatMap((beam) => this.beams[beam]!.map((node): Point =>
+      [this.rest[2 * node]! + displacement[2 * node]!, this.rest[2 * node + 1]! + displacement[2 * node + 1]!])), margin);
+  }
+
+  /** Enlarge the view, if necessary, so that points are inside. */
+  private enlarge(points: Point[], margin = 0.6): void {
     const { x, y, w, h } = this.view;
     let [x0, y0, x1, y1] = [x, y, x + w, y + h];
-    for (let k = 0; k < beams.length; k++) for (const node of this.beams[beams[k]!]!) {
-      const px = this.rest[2 * node]! + displacement[2 * node]!;
-      const py = -(this.rest[2 * node + 1]! + displacement[2 * node + 1]!);
-      x0 = Math.min(x0, px - margin); x1 = Math.max(x1, px + margin); y0 = Math.min(y0, py - margin); y1 = Math.max(y1, py + margin);
+    for (const [px, py] of points) {
+      x0 = Math.min(x0, px - margin); x1 = Math.max(x1, px + margin);
+      y0 = Math.min(y0, -py - margin); y1 = Math.max(y1, -py + margin);
     }
     this.setView({ x: x0, y: y0, w: x1 - x0, h: y1 - y0 });
   }
@@ -169,6 +176,18 @@ export class Drawing implements LatticeDrawing {
       this.under.append(path);
     }
     path.setAttribute("d", this.lines(beams, this.rest));
+  }
+
+  /** Fill an outline at rest below the beams, mark screw holes of a radius above them, and make room for all. */
+  printed(loops: Point[][], screws: Point[], hole: number): void {
+    if (!this.outline.parentNode) {
+      this.under.prepend(this.outline);
+      this.overlay.append(this.screws);
+    }
+    this.outline.setAttribute("d", loops.map((loop) => `M${loop.map(([x, y]) => `${x.toFixed(3)} ${(-y).toFixed(3)}`).join("L")}Z`).join(""));
+    const [r, d] = [hole.toFixed(3), (2 * hole).toFixed(3)];
+    this.screws.setAttribute("d", screws.map(([x, y]) => `M${(x - hole).toFixed(3)} ${(-y).toFixed(3)}a${r} ${r} 0 1 0 ${d} 0a${r} ${r} 0 1 0 -${d} 0Z`).join(""));
+    this.enlarge(loops.flat());
   }
 
   path(name: string): SVGPathElement {

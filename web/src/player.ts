@@ -1,6 +1,6 @@
 // Animation of a design along its computed path, with amplification and colours.
 
-import { isInSpace, post, type Motion, type Problem, type ToleranceFound } from "./api";
+import { isInSpace, post, type Motion, type Point, type Problem, type ToleranceFound } from "./api";
 import { bitsOf } from "./api";
 import { binned, BINS, Drawing, markRegions, sectionOf, where, type Group, type LatticeDrawing } from "./drawing";
 import { loadSpace } from "./loadspace";
@@ -13,6 +13,8 @@ export interface Picture { points: number[]; cells: number[]; corners: number; s
 export interface Sensitivity { efficiency: number; beams: number[]; change: (number | null)[] }
 
 const PERIOD = 3200;
+/** Radius of screw holes, mm. */
+const SCREW = 1.7;
 
 export class Player {
   private drawing: LatticeDrawing | null = null;
@@ -40,6 +42,8 @@ export class Player {
   private touching = new Set<number>();
   private losses: ToleranceFound["losses"] | null = null;
   private picture: Picture | null = null;
+  private outline: Point[][] = [];
+  private screws: Point[] = [];
   private shares = new Float64Array(0);
   /** Called when the stress is selected before it is computed. */
   onStressRequested: () => void = () => {};
@@ -83,6 +87,7 @@ export class Player {
     drawing.ghost("rest", this.beams);
     if (drawing instanceof Drawing) {
       drawing.overlay.append(this.stress);
+      drawing.printed(this.outline, this.screws, SCREW / this.scale);
       drawing.dimensions(this.scale);
     }
     drawing.element.addEventListener("pointermove", (event) => this.point(event as PointerEvent));
@@ -164,6 +169,14 @@ export class Player {
     if (!this.touching.size) return groups;
     const others = groups.map(({ name, beams }) => ({ name, beams: Array.from(beams).filter((beam) => !this.touching.has(beam)) }));
     return [...others, { name: "touching", beams: this.beams.filter((beam) => this.touching.has(beam)) }];
+  }
+
+  /** Draw the outline of the printed part at rest, with its plate, screw holes and pads; `scale` is the length of a unit in mm. */
+  showOutline(loops: Point[][], screws: Point[], scale: number): void {
+    const inUnits = ([x, y]: Point): Point => [x / scale, y / scale];
+    this.outline = loops.map((loop) => loop.map(inUnits));
+    this.screws = screws.map(inUnits);
+    if (this.drawing instanceof Drawing) this.drawing.printed(this.outline, this.screws, SCREW / scale);
   }
 
   showStress(picture: Picture | null): void {

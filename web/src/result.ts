@@ -29,7 +29,7 @@ export interface Subject {
 }
 
 interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null; items: ItemState[] | null; figures: PartFigures[] | null }
-interface Remarks { size: [number, number, number]; volume: number; mass: number | null; stroke: number | null; remarks: string[]; touching: number[]; /** Centres of screw holes, mm. */ screws: Point[] }
+interface Remarks { size: [number, number, number]; /** Box that holds the part along the stroke, mm. */ swept: number[]; volume: number; mass: number | null; stroke: number | null; remarks: string[]; touching: number[]; /** Centres of screw holes, mm. */ screws: Point[]; /** Loops of the outline with plate and pads, mm. */ outline: Point[][] }
 interface Print { minutes: number | null; layers: number; layer_mm: number; mass: number | null; slicer: string; profile: string }
 
 /** The level of the printed body, in which a specification is checked; that of a part in space takes minutes. */
@@ -268,7 +268,7 @@ export class Result {
     const { efficiency, comparison, mask } = this.subject;
     const beams = bitsOf(mask, this.subject.problem.beams.length).reduce((a, b) => a + b, 0);
     const rows: (HTMLElement | null)[] = [
-      h("tr", {}, h("th", { scope: "row" }, this.subject.problem.section ? "As searched" : "Spring model"), h("td", {}, figure(efficiency, 3)), h("td", { class: "more" }, `${beams} beams`)),
+      h("tr", {}, h("th", { scope: "row" }, this.subject.problem.section ? "As searched" : "Spring model"), h("td", {}, figure(efficiency, 3)), h("td", { class: "more" }, this.subject.problem.section ? count(beams, "strut") : `${beams} beams`)),
       comparison && h("tr", {}, h("th", { scope: "row" }, comparison.title === "yours" ? "Your design" : "Drawn by hand"), h("td", {}, figure(comparison.efficiency, 3)),
         h("td", { class: "more" }, comparison.efficiency && efficiency && comparison.efficiency > 0 && efficiency > comparison.efficiency ? `${figure(comparison.efficiency / efficiency, 2)} of the result` : "")),
       ...(this.registries?.levels ?? []).filter(this.isOffered).map((level) => this.femRow(level)),
@@ -336,23 +336,23 @@ export class Result {
     if (tolerance === "running") { clear(this.toleranceBox, h("p", { class: "more" }, h("span", { class: "working" }), `computing${this.shareText("tolerance")}`)); return; }
     if (typeof tolerance === "string") { clear(this.toleranceBox, h("p", { class: "fault", role: "alert" }, tolerance)); return; }
     const [head, ...rows] = tolerance.rows;
-    // The narrow panel shows first what counts most.
-    const order = ["item", "drawn", "yield", "95 %"];
-    const place = (name: string): number => (order.includes(name) ? order.indexOf(name) : order.length);
-    const shown = head!.map((name, k) => ({ name, k })).filter(({ name }) => name !== "wanted").sort((a, b) => place(a.name) - place(b.name));
+    // The panel is narrow: the worst values of each item are a line below it.
+    const first = ["drawn", "95 %", "yield"];
+    const worst = head!.map((name, k) => ({ name, k })).filter(({ name }) => ![...first, "item", "wanted"].includes(name));
     clear(this.toleranceBox, h("p", {}, sentence(tolerance.sentence)),
-      h("p", { class: "note" }, `Yield: the part of the random prints that meet an item; 95 %: the value that 95 of 100 prints reach. Then the worst values for ${tolerance.deviations}, and of the prints. “lost”: the part does not reach the full stroke; “more”: above the bound.`),
-      h("div", { class: "report", tabindex: 0, role: "region", "aria-label": "Tolerance" },
-        h("table", { class: "items tolerance" }, h("caption", {}, "Values as drawn, and in the scenarios"),
-          h("thead", {}, h("tr", {}, ...shown.map(({ name }) => h("th", { scope: "col" }, name)))),
-          h("tbody", {}, ...rows.map((row) => h("tr", {}, ...shown.map(({ k }) => (k === 0 ? h("th", { scope: "row" }, row[k]!, h("small", {}, row[1]!)) : h("td", {}, row[k]!)))))))),
+      h("p", { class: "note" }, `95 %: the value that 95 of 100 random prints reach. Yield: the part of the prints that meet an item. Worst values are those for ${tolerance.deviations}, and of the prints. “lost”: the part does not reach the full stroke; “more”: above the bound.`),
+      h("table", { class: "items tolerance" }, h("caption", {}, "Values as drawn, and in the scenarios"),
+        h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "item"), ...first.map((name) => h("th", { scope: "col" }, name)))),
+        ...rows.map((row) => h("tbody", {},
+          h("tr", {}, h("th", { scope: "rowgroup" }, row[0]!, h("small", {}, row[1]!)), ...first.map((name) => h("td", {}, row[head!.indexOf(name)]!))),
+          h("tr", { class: "worst" }, h("td", { colspan: 4 }, "worst: ", worst.map(({ name, k }) => `${name} ${row[k]}`).join(", ")))))),
       this.lossText(tolerance.losses));
   }
 
   private lossText({ cost }: ToleranceFound["losses"]): HTMLElement {
     const needed = cost.filter((each) => each === null).length;
     const half = cost.filter((each) => each !== null && each > 0.5).length;
-    return h("p", { class: "note" }, `Of ${cost.length} struts, ${needed} are needed to reach the full stroke, and the loss of ${half} others costs more than half of the efficiency. They are coloured in the drawing.`);
+    return h("p", { class: "note" }, `Of ${cost.length} struts that are not between two supports, ${needed} are needed to reach the full stroke, and the loss of ${half} others costs more than half of the efficiency. They are coloured in the drawing.`);
   }
 
   private showPart(fault = ""): void {
@@ -380,11 +380,17 @@ export class Result {
       fault && h("p", { class: "fault", role: "alert" }, fault),
       remarks && h("p", { class: "more" }, `${remarks.size.map((v) => figure(v, v % 1 ? 1 : 0)).join(" × ")} mm`,
         remarks.mass === null ? "" : `, ${figure(remarks.mass, 1)} g`, remarks.stroke === null ? "" : `, stroke ${figure(remarks.stroke, 2)} mm`),
-      remarks && h("p", { class: "note" }, this.excessText(remarks.size)),
+      remarks && h("p", { class: "note" }, `${this.sweptText(remarks)}${this.excessText(remarks.size)}`),
       remarks && this.hasSlicer && this.printTime(),
       remarks && remarks.remarks.length > 0 && h("details", { class: "remarks" },
         h("summary", {}, `${remarks.remarks.length} ${remarks.remarks.length === 1 ? "remark" : "remarks"} on printing`),
         h("ul", {}, ...remarks.remarks.map((text) => h("li", {}, sentence(text))))));
+  }
+
+  /** The space that the part needs while it moves. */
+  private sweptText({ swept }: Remarks): string {
+    const first = (this.subject.problem.specification?.cases?.length ?? 0) > 1 ? ", in its first load case" : "";
+    return `It moves within ${swept.map((v) => figure(v, v % 1 ? 1 : 0)).join(" × ")} mm${first}. `;
   }
 
   /** That the part is larger than the domain of its task; empty if it is not. */
@@ -501,14 +507,14 @@ export class Result {
     const size = gripped.size.map((v) => figure(v, v % 1 ? 1 : 0)).join(" × ");
     const mass = gripped.mass === null ? "" : `, ${figure(gripped.mass, 1)} g`;
     const holes = gripped.screws.length ? ` Centres of the holes in the files: ${gripped.screws.map(([x, y]) => `(${figure(x, 1)}, ${figure(y, 1)})`).join(", ")} mm.` : "";
-    return `With these additions ${size} mm${mass}. A row of nodes at a side gets a plate outside of the part. They are in the files, not in the drawing and the print time.${holes}`;
+    return `With these additions ${size} mm${mass}. A row of nodes at a side gets a plate outside of the part. They are in the files and drawn at rest; the print time is without them.${holes}`;
   }
 
   private async describeGripped(): Promise<void> {
     const { problem, mask } = this.subject;
     const { grips } = this;
     this.gripped = null;
-    if (!this.hasGrips) return;
+    if (!this.hasGrips) { this.player.showOutline([], [], this.part.scale); return; }
     let found: Remarks | string;
     try {
       found = await post<Remarks>("/part", { problem, mask, part: this.part, ...grips });
@@ -517,6 +523,8 @@ export class Result {
     }
     if (grips !== this.grips) return;
     this.gripped = found;
+    if (typeof found === "string") this.player.showOutline([], [], this.part.scale);
+    else this.player.showOutline(found.outline, found.screws, this.part.scale);
     this.showFiles();
   }
 

@@ -36,18 +36,22 @@ class Contacts:
         Largest penetration along the stroke, mm: strut width minus distance of the centre lines.
     onset : (p,) float64
         Fraction of the stroke at the first checked state in which the pair touches.
+    meets : (p,) bool
+        Whether the pair meets in a node. The clearance of a specification is without such pairs.
 
     Examples
     --------
-    >>> contacts = Contacts(np.array([[7, 9]]), np.array([0.5]), np.array([0.25]))
+    >>> one = np.array([[7, 9]]), np.array([0.5]), np.array([0.25])
+    >>> contacts = Contacts(*one, meets=np.array([True]))
     >>> contacts.first, contacts.message
-    (0.25, 'a pair of struts touches or crosses, beams 7 and 9 from 25% of the stroke on, \
-by up to 0.5 mm')
+    (0.25, 'a pair of struts that meet in a node touches or crosses, beams 7 and 9 from 25% of \
+the stroke on, by up to 0.5 mm')
     """
 
     pairs: NDArray[np.int64]
     overlap: NDArray[np.float64]
     onset: NDArray[np.float64]
+    meets: NDArray[np.bool_]
 
     @property
     def first(self) -> float | None:
@@ -62,14 +66,15 @@ by up to 0.5 mm')
         one, other = self.pairs[earliest]
         which = f"beams {one} and {other} from {self.onset[earliest]:.0%} of the stroke on"
         if count == 1:
-            return (
-                f"a pair of struts touches or crosses, {which}, by up to {self.overlap[0]:.2g} mm"
-            )
+            pair = "a pair of struts" + " that meet in a node" * bool(self.meets[0])
+            return f"{pair} touches or crosses, {which}, by up to {self.overlap[0]:.2g} mm"
         deepest = np.argmax(self.overlap)
         one, other = self.pairs[deepest]
+        among = int(self.meets.sum())
+        meeting = f", {'all' if among == count else among} of struts that meet in a node"
         return (
-            f"{count} pairs of struts touch or cross, first {which}; largest overlap "
-            f"{self.overlap[deepest]:.2g} mm between beams {one} and {other}"
+            f"{count} pairs of struts touch or cross{meeting * bool(among)}, first {which}; "
+            f"largest overlap {self.overlap[deepest]:.2g} mm between beams {one} and {other}"
         )
 
     def to_list(self) -> list[dict[str, Any]]:
@@ -133,7 +138,9 @@ def find_contacts(
     ordered = sorted(found.items())
     pairs = np.array([pair for pair, _ in ordered], dtype=np.int64).reshape(-1, 2)
     values = np.array([value for _, value in ordered], dtype=np.float64).reshape(-1, 2)
-    return Contacts(struts[pairs].reshape(-1, 2), values[:, 0], values[:, 1])
+    one, other = rest[pairs.T][:, :, [0, -1]]
+    meets = np.isclose(one[:, :, None], other[:, None]).all(axis=-1).any(axis=(1, 2))
+    return Contacts(struts[pairs].reshape(-1, 2), values[:, 0], values[:, 1], meets)
 
 
 def _overlaps(

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 ELEMENTS = 8
 """Number of elements of each beam; with it efficiencies are within 1e-4 of the limit of many."""
-NO_CONTACT = Contacts(np.empty((0, 2), np.int64), np.empty(0), np.empty(0))
+NO_CONTACT = Contacts(np.empty((0, 2), np.int64), np.empty(0), np.empty(0), np.empty(0, bool))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -38,6 +38,8 @@ BODIES = {"plane": "sheet", "solid": "solid"}
 """Names of the models of the printed body in which a specification is computed, by level."""
 LEAST_SHARE = 0.01
 """Smallest change of the fraction of a computation that is written."""
+DRAWN_SAGITTA = 0.05
+"""Largest distance of a drawn outline from its arcs, mm."""
 MAX_VERTICES = 60_000
 """Largest number of vertices of a picture of stress."""
 
@@ -165,8 +167,9 @@ def part_summary(
     Returns
     -------
     dict
-        Lengths in mm, ``volume`` in cm³, ``mass`` in g; ``screws``, the centres of screw holes in
-        the coordinates of the files.
+        Lengths in mm, ``volume`` in cm³, ``mass`` in g; ``swept``, the box that holds the part
+        along the stroke; ``screws``, the centres of screw holes in the coordinates of the files;
+        ``outline``, the loops of the outline in the same coordinates if there are additions.
     """
     from bellcrank.part import PartSpec
     from bellcrank.workflows.fabricate import (
@@ -176,6 +179,8 @@ def part_summary(
         print_warnings,
         profile_for,
         size_and_volume,
+        stroke_of,
+        swept_size,
     )
 
     spec = PartSpec.from_dict(part)
@@ -183,18 +188,22 @@ def part_summary(
     bundle = bundle_of(design_of(text, mask), spec, added, layer=0.32)
     size, volume = size_and_volume(bundle)
     holes = () if bundle.shape is None else bundle.shape.holes
+    loops = bundle.shape.loops if bundle.shape is not None and added != Grips() else ()
     # Those of screws are the last ones.
     screws = [hole.points.mean(axis=0) for hole in holes[len(holes) - added.screws :]]
-    contacts = contacts_of(bundle.part)
+    stroke = stroke_of(bundle.part)
+    contacts = contacts_of(bundle.part, stroke)
     mass = volume * bundle.part.material.density / 1000.0
     return {
         "size": [round(length, 3) for length in size],
+        "swept": [round(length, 1) for length in swept_size(bundle, stroke)],
         "volume": round(volume / 1000.0, 3),
         "mass": round(mass, 2) if math.isfinite(mass) else None,
         "stroke": bundle.part.stroke if math.isfinite(bundle.part.stroke) else None,
         "remarks": print_warnings(bundle, profile_for(_profile_name(spec), spec), contacts),
         "touching": np.unique(contacts.pairs).tolist(),
         "screws": sorted(centre.round(2).tolist() for centre in screws),
+        "outline": [loop.flattened(DRAWN_SAGITTA).round(2).tolist() for loop in loops],
     }
 
 

@@ -23,7 +23,10 @@ from bellcrank.part.pieces import check_supported, connection_warnings
 from bellcrank.workflows.loading import loading_path
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
     from bellcrank.export.profiles import PrintProfile
     from bellcrank.export.slicer import Sliced
@@ -213,15 +216,40 @@ def size_and_volume(bundle: Export) -> tuple[tuple[float, float, float], float]:
     return (right - left, top - bottom, bundle.thickness), outline.area * bundle.thickness
 
 
-def contacts_of(part: Part) -> Contacts:
-    """Return the struts of a part that touch or cross along its stroke."""
+def stroke_of(part: Part) -> list[tuple[float, NDArray[np.float64]]]:
+    """Return fractions of the full input and (N, d) positions of the nodes of a part, mm."""
     evaluator = StrokeEvaluator(model_evaluator(part.design.problem))
-    stroke = (
-        (load, centre_lines((part.positions + part.scale * displacement)[part.struts]))
+    return [
+        (load, part.positions + part.scale * displacement)
         for load, displacement in evaluator.displacements(part.design.mask)
-    )
-    beams, rest = np.flatnonzero(part.design.mask), centre_lines(part.positions[part.struts])
-    return find_contacts(beams, rest, stroke, part.widths)
+    ]
+
+
+def swept_size(bundle: Export, stroke: list[tuple[float, NDArray[np.float64]]]) -> list[float]:
+    """Return the lengths of the smallest box along the axes that holds a part on its stroke, mm.
+
+    In the plane without the thickness. Plate and pads are those at rest.
+    """
+    part = bundle.part
+    half = 0.5 * part.widths[:, None, None]
+    states = [part.positions, *(positions for _, positions in stroke)]
+    ends = np.stack([positions[part.struts] for positions in states])
+    low, high = (ends - half).min(axis=(0, 1, 2)), (ends + half).max(axis=(0, 1, 2))
+    if part.dimension == 2:
+        bounds = np.reshape(bundle.outline().bounds, (2, 2))
+        low, high = np.minimum(low, bounds[0]), np.maximum(high, bounds[1])
+    return [float(length) for length in high - low]
+
+
+def contacts_of(
+    part: Part, stroke: Iterable[tuple[float, NDArray[np.float64]]] | None = None
+) -> Contacts:
+    """Return the struts of a part that touch or cross along its stroke."""
+    struts = part.struts
+    states = stroke_of(part) if stroke is None else stroke
+    lines = ((load, centre_lines(positions[struts])) for load, positions in states)
+    beams, rest = np.flatnonzero(part.design.mask), centre_lines(part.positions[struts])
+    return find_contacts(beams, rest, lines, part.widths)
 
 
 def print_warnings(
