@@ -11,13 +11,16 @@ import numpy as np
 import pytest
 
 from bellcrank.machines.bundled import bundled_part
-from bellcrank.model import Design, gallery_design
+from bellcrank.model import Design, Tolerances, gallery_design
 from bellcrank.part import PartSpec
 from bellcrank.refine import RefinementSettings
 from bellcrank.refine.state import state_of
 from bellcrank.task import find_task
 from bellcrank.workflows import refiners
 from bellcrank.workflows.refiners import (
+    EVALUATIONS,
+    KEPT_EVALUATIONS,
+    GeometryCount,
     refine_designs,
     second_model,
     sheet_of,
@@ -122,3 +125,14 @@ def test_in_the_plane_the_second_model_is_the_sheet() -> None:
     (design, _) = designs()
     assert second_model(design.problem) == "sheet"
     assert sheet_of(None, design) is None
+
+
+def test_the_number_of_geometries_is_larger_where_deviations_keep_the_efficiency() -> None:
+    task = find_task("straight-crane")
+    assert task is not None
+    wanted = task.problem.specification
+    assert wanted is not None
+    kept = replace(wanted, tolerances=Tolerances(width=0.2, keep=0.8))
+    plain = GeometryCount(2, task.problem).most
+    more = GeometryCount(2, replace(task.problem, specification=kept)).most
+    assert more - plain == 2 * (KEPT_EVALUATIONS - EVALUATIONS)

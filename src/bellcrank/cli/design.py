@@ -180,7 +180,7 @@ def design(
             _print_nodes(task, 10.0 if part is None else part.scale)
         command = f"bellcrank design --resume {shlex.quote(str(folder.path))}"
         stop.hint = f"Stopped. To continue: {plain(command)}"
-        with SearchProgress(read_settings(folder.settings)) as progress:
+        with SearchProgress(read_settings(folder.settings), folder.problem) as progress:
             report = complete_design(
                 folder,
                 workers=workers,

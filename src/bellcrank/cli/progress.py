@@ -14,6 +14,7 @@ from bellcrank.search import Progress as Step
 from bellcrank.search import SearchSettings
 
 if TYPE_CHECKING:
+    from bellcrank.model import Problem
     from bellcrank.refine.refinement import Progress as RefinementStep
     from bellcrank.workflows.refiners import GeometryCount
 
@@ -26,12 +27,12 @@ class SearchProgress(Live):
 
     Parameters
     ----------
-    settings
-        Settings of the search.
+    settings, problem
+        Settings of the search, and its problem.
     """
 
-    def __init__(self, settings: SearchSettings) -> None:
-        self._chains = settings.chains
+    def __init__(self, settings: SearchSettings, problem: Problem) -> None:
+        self._chains, self._problem = settings.chains, problem
         self._total = settings.chains * settings.steps
         self._lock = threading.Lock()
         self._best = float("-inf")
@@ -70,7 +71,7 @@ class SearchProgress(Live):
 
         with self._lock:
             if self._geometries is None:
-                self._geometries = GeometryCount(self._chains)
+                self._geometries = GeometryCount(self._chains, self._problem)
                 self._bar.update(self._task, description="refining ")
             self._geometries.add(number, step.evaluations)
             if step.rows.violation <= MET:

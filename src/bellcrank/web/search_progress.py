@@ -39,7 +39,9 @@ class ProgressReporter:
         self._specification = specification_of(folder.problem)
         self._evaluator = self._specification or model_evaluator(folder.problem)
         self._part = PartSpec.from_dict(folder.provenance.get("part") or {}, "part")
-        self._refinements = RefinementReporter(self._part, GeometryCount(settings.chains))
+        self._refinements = RefinementReporter(
+            self._part, GeometryCount(settings.chains, folder.problem)
+        )
         self._total = settings.chains * settings.steps
         self._lock = threading.Lock()
         self._chains: dict[int, dict[str, Any]] = {}

@@ -55,6 +55,8 @@ class GeometryCount:
     ----------
     chains
         Number of chains of the search that found them.
+    problem
+        Problem of the search; None for one without deviations that keep a part of the efficiency.
     most
         Largest number of geometries, if it is given.
 
@@ -67,8 +69,11 @@ class GeometryCount:
     (120, 800)
     """
 
-    def __init__(self, chains: int = 1, most: int | None = None) -> None:
+    def __init__(
+        self, chains: int = 1, problem: Problem | None = None, most: int | None = None
+    ) -> None:
         self._chains, self._most = chains, most
+        self._further = further_settings(problem).evaluations
         self._latest: dict[int, int] = {}
         self._before = 0
 
@@ -90,7 +95,15 @@ class GeometryCount:
         if self._most is not None:
             return self._most
         first = max(len(self._latest), STARTS * self._chains)
-        return FIRST_EVALUATIONS * first + EVALUATIONS * self._chains
+        return FIRST_EVALUATIONS * first + self._further * self._chains
+
+
+def further_settings(problem: Problem | None) -> RefinementSettings:
+    """Return the settings of the refinement of the best designs of a search."""
+    wanted = None if problem is None else problem.specification
+    tolerances = None if wanted is None else wanted.tolerances
+    is_kept = tolerances is not None and tolerances.keep > 0.0
+    return replace(SETTINGS, evaluations=KEPT_EVALUATIONS) if is_kept else SETTINGS
 
 
 def refine_designs(
@@ -119,10 +132,7 @@ def refine_designs(
         Settings of each refinement; those of the designs that a search refines further by default.
     """
     if settings is None:
-        wanted = designs[0].problem.specification
-        tolerances = None if wanted is None else wanted.tolerances
-        is_kept = tolerances is not None and tolerances.keep > 0.0
-        settings = replace(SETTINGS, evaluations=KEPT_EVALUATIONS) if is_kept else SETTINGS
+        settings = further_settings(designs[0].problem)
     workers = min(workers, len(designs))
     if workers > 1:
         refined: dict[int, Refinement] = {}
