@@ -17,7 +17,7 @@ from bellcrank.mechanics import (
     tightened,
     violation,
 )
-from bellcrank.mechanics.items import path_deviation, path_error
+from bellcrank.mechanics.items import Bounds, path_deviation, path_error
 from bellcrank.model import Item
 
 FRACTIONS = np.array([0.25, 0.5, 0.75, 1.0])
@@ -84,7 +84,7 @@ def test_an_item_has_its_worst_value_and_a_normalised_violation(
 def test_a_value_that_is_unknown_violates_its_item_entirely() -> None:
     unstable = StrokeRecord(FRACTIONS, {Channel("strain"): np.array([np.nan])})
     wanted = item("strain", at_most=0.1)
-    assert violation(wanted, *reduced(wanted, unstable)) == math.log1p(1e3)
+    assert violation(Bounds.of(wanted), *reduced(wanted, unstable)) == math.log1p(1e3)
 
 
 def test_violations_of_many_flips_are_computed_at_once() -> None:
@@ -96,7 +96,7 @@ def test_violations_of_many_flips_are_computed_at_once() -> None:
         },
     )
     wanted = item("rotation", at_least=-5.0, at_most=5.0, start=0.0)
-    found = violation(wanted, *reduced(wanted, many))
+    found = violation(Bounds.of(wanted), *reduced(wanted, many))
     assert found == pytest.approx(np.log1p([1.0 / 5.0, 1.6 / 5.0, 7.0 / 5.0]))
     assert quantity_values(many, "off_axis", "tip")[:, 0] == pytest.approx([0.08, 0.08, 0.08])
 

@@ -18,7 +18,7 @@ from bellcrank.mechanics.analysis import (
     strain_of,
 )
 from bellcrank.mechanics.conditions import Conditions, LinearEquations
-from bellcrank.mechanics.contact import bent_pieces, near_pairs
+from bellcrank.mechanics.contact import BentStruts, near_pairs
 from bellcrank.mechanics.coupling import Coupling, free_nodes, uniform_motion
 from bellcrank.mechanics.evaluator import (
     VERIFICATION_INCREMENT,
@@ -65,6 +65,7 @@ from bellcrank.mechanics.superelement import Condensed, State, Superelement, sta
 
 __all__ = [
     "VERIFICATION_INCREMENT",
+    "BentStruts",
     "CaseEvaluator",
     "Channel",
     "Condensed",
@@ -92,7 +93,6 @@ __all__ = [
     "Superelement",
     "UnloadedBeams",
     "at_fraction",
-    "bent_pieces",
     "channels_of",
     "check_memory",
     "compile_ahead",

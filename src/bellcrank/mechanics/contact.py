@@ -32,8 +32,8 @@ def near_pairs(
     """
     from bellcrank.mechanics.kernels.contact import find_near_pairs
 
-    ends = positions[beams]
-    left, right = ends.min(axis=1), ends.max(axis=1)
+    first, second = positions[beams[:, 0]], positions[beams[:, 1]]
+    left, right = np.minimum(first, second), np.maximum(first, second)
     order = np.argsort(left[:, 0])
     count = len(beams)
     while True:
@@ -44,12 +44,11 @@ def near_pairs(
         count = found
 
 
-def bent_pieces(
-    problem: Problem, beams: NDArray[np.int64], u: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return points of bent struts and the straight pieces between them.
+class BentStruts:
+    """Straight pieces of bent struts.
 
     In the plane every strut has a point in its middle, on the cubic that its end rotations define.
+    In space struts are straight.
 
     Parameters
     ----------
@@ -57,31 +56,43 @@ def bent_pieces(
         Problem of a frame.
     beams : (n,) int64
         The struts.
-    u : (N, 3)
-        State of the nodes, with one element in each beam.
 
-    Returns
-    -------
-    points : (N + n, d)
+    Attributes
+    ----------
     pieces : (2 n, 2) int64
-        In space (N, d) and (n, 2): struts are straight.
+        Indices of the ends of each piece into the points; in space (n, 2).
     """
-    lattice = problem.lattice
-    nodes, dimension = lattice.positions.shape
-    moved = lattice.positions + u[:nodes, :dimension]
-    ends = lattice.beams[beams]
-    if dimension == 3:
-        return moved, ends
-    rest = lattice.positions[ends[:, 1]] - lattice.positions[ends[:, 0]]
-    chord = moved[ends[:, 1]] - moved[ends[:, 0]]
-    # The difference of the end rotations does not depend on the rotation of the chord, but each
-    # must be within half a turn of it.
-    turned = np.arctan2(rest[:, 0] * chord[:, 1] - rest[:, 1] * chord[:, 0], (rest * chord).sum(1))
-    first, second = ((u[ends[:, k], 2] - turned + np.pi) % (2.0 * np.pi) - np.pi for k in (0, 1))
-    normal = np.column_stack([-chord[:, 1], chord[:, 0]])
-    middle = moved[ends].mean(axis=1) + normal * ((first - second) / 8.0)[:, None]
-    number = nodes + np.arange(len(beams))
-    pieces = np.concatenate(
-        [np.column_stack([ends[:, 0], number]), np.column_stack([number, ends[:, 1]])]
-    )
-    return np.concatenate([moved, middle]), pieces
+
+    def __init__(self, problem: Problem, beams: NDArray[np.int64]) -> None:
+        self._positions = positions = problem.lattice.positions
+        self._first, self._second = first, second = problem.lattice.beams[beams].T
+        self._rest = positions[second] - positions[first]
+        if positions.shape[1] == 3:
+            self.pieces = np.column_stack([first, second])
+        else:
+            middle = len(positions) + np.arange(len(beams))
+            ends = np.column_stack([np.append(first, middle), np.append(middle, second)])
+            self.pieces = ends
+
+    def points(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return (N + n, d) the nodes and the points in the middle; in space (N, d).
+
+        Parameters
+        ----------
+        u : (N, b)
+            State of the nodes, with one element in each beam.
+        """
+        nodes, dimension = self._positions.shape
+        moved = self._positions + u[:nodes, :dimension]
+        if dimension == 3:
+            return moved
+        first, second = self._first, self._second
+        rest, chord = self._rest.T, (moved[second] - moved[first]).T
+        # The difference of the end rotations does not depend on the rotation of the chord, but each
+        # must be within half a turn of it.
+        turned = np.arctan2(rest[0] * chord[1] - rest[1] * chord[0], (rest * chord).sum(axis=0))
+        from_chord = u[np.stack([first, second]), 2] - turned
+        one, other = (from_chord + np.pi) % (2.0 * np.pi) - np.pi
+        normal = np.column_stack([-chord[1], chord[0]])
+        middle = 0.5 * (moved[first] + moved[second]) + normal * ((one - other) / 8.0)[:, None]
+        return np.concatenate([moved, middle])

@@ -6,6 +6,7 @@ responses of many flips.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -91,6 +92,8 @@ def _of_motion(quantity: str, motion: Values, *channels: Values) -> Values:
 def _ratio(numerator: Values, denominator: Values) -> Values:
     """Return a ratio, infinite where the denominator vanishes."""
     small = np.abs(denominator) < SMALLEST_TRAVEL
+    if not small.any():
+        return np.asarray(numerator / denominator)
     infinite = np.broadcast_to(np.where(numerator < 0.0, -np.inf, np.inf), small.shape).copy()
     return np.asarray(np.divide(numerator, denominator, out=infinite, where=~small))
 
@@ -240,36 +243,55 @@ def reduced(item: Item, record: StrokeRecord) -> tuple[Values, Values]:
     return low, high
 
 
-def relative_distance(item: Item, low: Values, high: Values) -> Values:
-    """Return by how much values exceed the bounds of an item, over the size of the bound.
+class Bounds(NamedTuple):
+    """Bounds of items, and their sizes (`scales_of`).
+
+    Each is one number, or an array of one for each item. A bound that is missing is nan.
+    """
+
+    least: float | Values
+    most: float | Values
+    least_scale: float | Values
+    most_scale: float | Values
+
+    @classmethod
+    def of(cls, item: Item) -> Bounds:
+        """Return the bounds of an item."""
+        least = math.nan if item.at_least is None else item.at_least
+        most = math.nan if item.at_most is None else item.at_most
+        return cls(least, most, *scales_of(item))
+
+    @classmethod
+    def of_all(cls, items: Sequence[Item]) -> Bounds:
+        """Return the bounds of several items as arrays (I,)."""
+        return cls(*np.array([cls.of(item) for item in items]).reshape(-1, 4).T)
+
+
+def relative_distance(bounds: Bounds, low: Values, high: Values) -> Values:
+    """Return by how much values exceed the bounds of items, over the size of the bound.
 
     Negative within the bounds; then its opposite is the margin.
 
     Parameters
     ----------
+    bounds
+        Bounds of one item, or of as many as the last axis of the values has.
     low, high : (...)
         Smallest and largest value that the bounds apply to (`reduced`).
     """
-    over = np.full(np.shape(low), -np.inf)
-    low_scale, high_scale = scales_of(item)
-    if item.at_most is not None:
-        over = np.maximum(over, (high - item.at_most) / high_scale)
-    if item.at_least is not None:
-        over = np.maximum(over, (item.at_least - low) / low_scale)
+    over = np.fmax(
+        (high - bounds.most) / bounds.most_scale, (bounds.least - low) / bounds.least_scale
+    )
     return np.where(np.isnan(over), np.inf, over)
 
 
-def violation(item: Item, low: Values, high: Values) -> Values:
-    """Return the violation of an item: ln(1 + e / s), e its excess and s the size of the bound.
+def violation(bounds: Bounds, low: Values, high: Values) -> Values:
+    """Return the violation of items: ln(1 + e / s), e the excess and s the size of the bound.
 
-    It is 0 if the item is met, and ln 2 at an excess of the size of the bound.
-
-    Parameters
-    ----------
-    low, high : (...)
-        Smallest and largest value that the bounds apply to (`reduced`).
+    It is 0 if an item is met, and ln 2 at an excess of the size of the bound. The parameters are
+    those of `relative_distance`.
     """
-    return np.log1p(np.clip(relative_distance(item, low, high), 0.0, LARGEST_EXCESS))
+    return np.log1p(np.clip(relative_distance(bounds, low, high), 0.0, LARGEST_EXCESS))
 
 
 def worst_value(item: Item, record: StrokeRecord) -> float:
@@ -286,7 +308,7 @@ def worst_value(item: Item, record: StrokeRecord) -> float:
 
 def margin(item: Item, value: float) -> float:
     """Return the distance of a value from the nearest bound, over its size; negative beyond."""
-    return -float(relative_distance(item, np.asarray(value), np.asarray(value)))
+    return -float(relative_distance(Bounds.of(item), np.asarray(value), np.asarray(value)))
 
 
 TOLERANCE = 1e-9
@@ -321,6 +343,6 @@ def item_results(items: Sequence[Item], records: Mapping[str, StrokeRecord]) -> 
     for item in items:
         record = records[item.case] if item.case else next(iter(records.values()))
         value = worst_value(item, record)
-        own = float(violation(item, *reduced(item, record)))
+        own = float(violation(Bounds.of(item), *reduced(item, record)))
         found.append(ItemResult(item, value, own, margin(item, value)))
     return found

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from bellcrank.mechanics import bent_pieces, near_pairs
+from bellcrank.mechanics import BentStruts, near_pairs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,7 +42,7 @@ def gaps_of(
 ) -> Gaps:
     """Return the gaps between struts without a common node that are below a reach.
 
-    Struts are bent as in `bellcrank.mechanics.bent_pieces`: two straight pieces each in the plane.
+    Struts are bent as in `bellcrank.mechanics.BentStruts`: two straight pieces each in the plane.
     Of struts that cross, the derivatives are 0.
 
     Parameters
@@ -55,7 +55,8 @@ def gaps_of(
         Largest gap that is returned, lattice units.
     """
     count, width = len(beams), problem.beam_widths[beams]
-    points, pieces = bent_pieces(problem, beams, u)
+    struts = BentStruts(problem, beams)
+    points, pieces = struts.points(u), struts.pieces
     pairs, distance = near_pairs(points, pieces, float(width.max()) + reach)
     # Struts that meet in a node overlap there; angles between them are constraints of their own.
     ends = problem.lattice.beams[beams[pairs % count]]

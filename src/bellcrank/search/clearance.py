@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bellcrank.fem.contact import find_contacts
-from bellcrank.mechanics import bent_pieces, near_pairs
+from bellcrank.mechanics import BentStruts, near_pairs
 from bellcrank.mechanics.frames.analysis import centre_lines
 from bellcrank.mechanics.stroke import STATES
 from bellcrank.search.stroke_states import SEARCH_STATES
@@ -74,10 +74,10 @@ def _near_struts(
     """Yield pairs of struts whose centre lines are near each other, at states of the stroke."""
     problem = case.problem
     beams = np.flatnonzero(printed_beams(problem, design, case.frame.structure.present != 0))
+    struts = BentStruts(problem, beams)
     for fraction in (np.arange(1, SEARCH_STATES + 1) / SEARCH_STATES).tolist():
         if (found := case.state(fraction)) is not None:
-            points, pieces = bent_pieces(problem, beams, found.state.u)
-            pairs, apart = near_pairs(points, pieces, distance)
+            pairs, apart = near_pairs(struts.points(found.state.u), struts.pieces, distance)
             first, second = beams[pairs.T % len(beams)]
             yield first, second, apart
 

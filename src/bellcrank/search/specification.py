@@ -23,7 +23,7 @@ from bellcrank.mechanics import (
     tightened,
     violation,
 )
-from bellcrank.mechanics.items import TOLERANCE, reduced, relative_distance
+from bellcrank.mechanics.items import TOLERANCE, Bounds, reduced, relative_distance
 from bellcrank.mechanics.stroke_record import forces_of
 from bellcrank.search.clearance import gap_less_overlaps
 from bellcrank.search.constraints.evaluator import BASE_PENALTY
@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     from bellcrank.model import Item, Problem
 
     Values = NDArray[np.float64]
-    Extremes = dict[int, tuple[Values, Values]]
-    """Smallest and largest values of items, by their number."""
 
 RESERVE = 0.05
 """Part of their size by which a search tightens all bounds, so that its designs meet them with more
@@ -51,6 +49,15 @@ VIOLATION_POWER = 3.0
 """Weight of violations against the objective while a specification is not met."""
 CHEAP = frozenset({"motion", "displacement", "input_motion", "rotation"})
 """Channels that cost little at a known state; the others are measured last."""
+
+
+class _Known(NamedTuple):
+    """What is known of a design, or of many."""
+
+    extremes: dict[int, tuple[Values, Values]]
+    """Smallest and largest values of items, by their number."""
+    objectives: dict[int, Values]
+    """Objectives over their scale, by their number."""
 
 
 class _Case(NamedTuple):
@@ -123,6 +130,12 @@ class SpecificationEvaluator:
             self.cases[name] = _Case(evaluator, chosen, channels, cheap, fractions)
         self.records: dict[str, StrokeRecord] = {}
         self.violations = np.ones(len(self.items))
+        self._bounds = Bounds.of_all(self.items)
+        # Items whose margins count where there is no objective.
+        self._in_margin = np.array(
+            [bool(each.case and channels_of(each.quantity, each.output)) for each in self.items],
+            dtype=bool,
+        )
         evaluators = {name: case.evaluator for name, case in self.cases.items()}
         self._given = GivenQuantities(self.problem, self.items, evaluators, elements, gap)
 
@@ -167,16 +180,16 @@ class SpecificationEvaluator:
                 self.violations = np.ones(len(self.items))
                 return replace(response, penalty=math.inf)
         response = responses[0]
-        extremes: Extremes = {}
+        known = _Known({}, {})
         score = -math.inf
         for records in self._stages(design, structural, verified=verified):
-            extremes = self._extremes(records, extremes)
-            score = float(self._scores(records, extremes))
+            self._update(records, known)
+            score = float(self._scores(known))
             if bounded and score <= lower_bound:
                 status: Outcome = Status.UNVERIFIED
                 return replace(response, status=status, penalty=response.efficiency - score)
         self.records = records
-        self.violations = self._violations(extremes)
+        self.violations = self._violations(known)
         met = bool((self.violations <= TOLERANCE).all())
         status = Status.CONVERGED if met else Verdict.UNMET
         return replace(response, status=status, penalty=response.efficiency - score)
@@ -228,38 +241,43 @@ class SpecificationEvaluator:
                 return replace(response, penalty=math.inf)
             channels = case.evaluator.values(case.cheap, [1.0])
             records[name] = StrokeRecord(np.ones(1), channels, structural)
-        score = float(self._scores(records, self._extremes(records)))
+        score = float(self._scores(self._known(records)))
         if score > lower_bound:
             return None
         assert first is not None
         return replace(first, status=Status.UNVERIFIED, penalty=first.efficiency - score)
 
-    def _extremes(
-        self, records: dict[str, StrokeRecord], earlier: Extremes | None = None
-    ) -> Extremes:
-        """Return smallest and largest values of all items that are known.
+    def _known(self, records: dict[str, StrokeRecord]) -> _Known:
+        """Return what records of the load cases show."""
+        known = _Known({}, {})
+        self._update(records, known)
+        return known
 
-        Parameters
-        ----------
-        records
-            Channels of each load case.
-        earlier
-            Those of records with fewer channels at the same states, which are not computed again.
-        """
-        found: Extremes = {} if earlier is None else dict(earlier)
+    def _update(self, records: dict[str, StrokeRecord], known: _Known) -> None:
+        """Add what records of the load cases show, and fewer channels did not."""
+        first = next(iter(records.values()))
         for index, item in enumerate(self.items):
-            record = records[item.case] if item.case else next(iter(records.values()))
-            if index not in found and self._is_known(item, record):
-                found[index] = reduced(item, record)
-        return found
+            record = records[item.case] if item.case else first
+            if index not in known.extremes and self._is_known(item, record):
+                known.extremes[index] = reduced(item, record)
+        for index, objective in enumerate(self.objectives):
+            record = records[objective.case] if objective.case else first
+            quantity, output = objective.quantity, objective.output
+            if index not in known.objectives and has_channels(quantity, output, record):
+                value = quantity_values(record, quantity, output)[..., -1]
+                known.objectives[index] = value / objective.scale
 
-    def _violations(self, extremes: Extremes) -> Values:
-        """Return (..., I) the violations of all items; 0 for those that are not known yet."""
-        found = [
-            violation(item, *extremes[index]) if index in extremes else np.zeros(())
-            for index, item in enumerate(self.items)
-        ]
-        return np.stack(np.broadcast_arrays(*found), axis=-1) if found else np.zeros(0)
+    def _violations(self, known: _Known) -> Values:
+        """Return (..., I) the violations of all items that are known, in their order."""
+        return violation(*self._bounded(known, sorted(known.extremes)))
+
+    def _bounded(self, known: _Known, chosen: list[int]) -> tuple[Bounds, Values, Values]:
+        """Return bounds and smallest and largest values (..., I) of some items."""
+        bounds = self._bounds
+        if len(chosen) < len(self.items):
+            bounds = Bounds(*(np.asarray(each)[chosen] for each in bounds))
+        low, high = (np.array([known.extremes[k][end] for k in chosen]).T for end in (0, 1))
+        return bounds, low, high
 
     @staticmethod
     def _is_known(item: Item, record: StrokeRecord) -> bool:
@@ -271,33 +289,24 @@ class SpecificationEvaluator:
         # Only the state at full stroke is known.
         return item.quantity != "path_error" and item.stop == 1.0 and item.of == "every"
 
-    def _objective(self, records: dict[str, StrokeRecord], extremes: Extremes) -> Values:
+    def _objective(self, known: _Known) -> Values:
         """Return (...) the smallest objective; without objectives, the smallest margin.
 
         An upper bound where not all channels are known.
         """
         if not self.objectives:
-            return self._smallest_margin(extremes)
-        values = []
-        for objective in self.objectives:
-            record = records[objective.case] if objective.case else next(iter(records.values()))
-            if has_channels(objective.quantity, objective.output, record):
-                value = quantity_values(record, objective.quantity, objective.output)[..., -1]
-                values.append(value / objective.scale)
-        if not values:
-            return np.asarray(np.inf)
-        return np.asarray(np.minimum.reduce(np.broadcast_arrays(*values)))
+            return self._smallest_margin(known)
+        values = list(known.objectives.values())
+        return np.asarray(np.minimum.reduce(values)) if values else np.asarray(np.inf)
 
-    def _smallest_margin(self, extremes: Extremes) -> Values:
+    def _smallest_margin(self, known: _Known) -> Values:
         """Return (...) the smallest margin of an item that follows from channels, at least 0."""
-        margins = [
-            -relative_distance(item, *extremes[index])
-            for index, item in enumerate(self.items)
-            if index in extremes and item.case and channels_of(item.quantity, item.output)
-        ]
-        smallest = np.minimum.reduce(np.broadcast_arrays(*margins)) if margins else np.zeros(())
+        chosen = [index for index in sorted(known.extremes) if self._in_margin[index]]
+        if not chosen:
+            return np.zeros(())
+        margins = -relative_distance(*self._bounded(known, chosen))
         # Where items are not met, their violations count.
-        return np.asarray(np.maximum(0.0, smallest))
+        return np.asarray(np.maximum(0.0, margins.min(axis=-1)))
 
     @staticmethod
     def score(total: Values, objective: Values) -> Values:
@@ -316,10 +325,10 @@ class SpecificationEvaluator:
         unmet = reduced_objective - BASE_PENALTY
         return np.asarray(np.where(total > TOLERANCE, unmet, objective))
 
-    def _scores(self, records: dict[str, StrokeRecord], extremes: Extremes) -> Values:
+    def _scores(self, known: _Known) -> Values:
         """Return (...) the scores; upper bounds where not all channels are known."""
-        total = self._violations(extremes).sum(axis=-1)
-        return self.score(total, self._objective(records, extremes))
+        total = self._violations(known).sum(axis=-1)
+        return self.score(total, self._objective(known))
 
     def set_reference(self) -> None:
         """Make the design evaluated last the reference of warm starts."""
@@ -352,9 +361,9 @@ class SpecificationEvaluator:
             mass = volume + self.groups.total(sign * self._volume[members])
             given = {key: np.full(count, value) for key, value in now.given.items()}
             records[name] = replace(now, channels=channels, given={**given, "mass": mass})
-        before = self._scores(self.records, self._extremes(self.records))
+        before = self._scores(self._known(self.records))
         with np.errstate(invalid="ignore"):
-            score = self._scores(records, self._extremes(records))
+            score = self._scores(self._known(records))
         change = np.where(self.groups.largest(changed.astype(float)) > 0.0, score - before, 0.0)
         return FlipPrediction(
             self.groups.beams, np.nan_to_num(change, nan=-1e3, neginf=-1e3, posinf=1e3),

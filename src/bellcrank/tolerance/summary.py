@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from bellcrank.mechanics.items import relative_distance
+from bellcrank.mechanics.items import Bounds, relative_distance
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -113,7 +113,7 @@ class Tolerance:
         ]
 
         def distance(value: float) -> float:
-            return float(relative_distance(item, np.asarray(value), np.asarray(value)))
+            return float(relative_distance(Bounds.of(item), np.asarray(value), np.asarray(value)))
 
         met = [result.is_stable and result.items[index].met for result in self.results]
         return self._row(item, values, distance, met)

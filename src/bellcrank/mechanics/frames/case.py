@@ -22,8 +22,8 @@ from bellcrank.mechanics.frames.output_loads import (
 )
 from bellcrank.mechanics.frames.quantities import quantities
 from bellcrank.mechanics.frames.quantities.definition import Quantity, linear, vector
-from bellcrank.mechanics.frames.quantities.forces import mean_displacement_fields
-from bellcrank.mechanics.frames.quantities.motion import input_field, output_fields
+from bellcrank.mechanics.frames.quantities.forces import mean_weights
+from bellcrank.mechanics.frames.quantities.motion import input_weights, output_weights
 from bellcrank.mechanics.status import Status
 
 if TYPE_CHECKING:
@@ -46,16 +46,16 @@ class Channel(NamedTuple):
 
 
 CHANNELS: dict[str, Quantity] = {
-    "motion": Quantity(*linear(output_fields), combine=vector),
-    "displacement": Quantity(*linear(mean_displacement_fields), combine=vector),
-    "input_motion": Quantity(*linear(input_field)),
+    "motion": Quantity(*linear(output_weights), combine=vector),
+    "displacement": Quantity(*linear(mean_weights), combine=vector),
+    "input_motion": Quantity(*linear(input_weights)),
     "rotation": quantities["rotation"],
     "input_force": quantities["input_force"],
     "strain": quantities["strain"],
     "stiffness": quantities["output_stiffness"],
     "blocked_force": quantities["blocked_force"],
-    "loaded_motion": Quantity(*linear(output_fields), combine=vector, load="payload"),
-    "carried_motion": Quantity(*linear(output_fields), combine=vector, load="dead load"),
+    "loaded_motion": Quantity(*linear(output_weights), combine=vector, load="payload"),
+    "carried_motion": Quantity(*linear(output_weights), combine=vector, load="dead load"),
     "sag": quantities["sag"],
 }
 """Channels by name. Motion: along the wanted direction, then the components normal to it."""

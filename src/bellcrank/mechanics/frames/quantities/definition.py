@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics.frames.equilibria import Equilibrium
     from bellcrank.mechanics.kernels.arrays import Floats, Ints
+    from bellcrank.model import Problem
 
     Values = NDArray[np.float64]
 
@@ -96,28 +97,42 @@ quantities: Registry[Quantity] = Registry("quantity")
 """Quantities of frames by name."""
 
 
+class Weights(NamedTuple):
+    """Weights of the displacements of some nodes in measures."""
+
+    nodes: Ints
+    """(n,)"""
+    values: NDArray[np.float64]
+    """(k, n, d)"""
+
+    def sums(self, displacement: Floats) -> Floats:
+        """Return (k,) the weighted sums of displacements (N, d)."""
+        chosen = displacement[self.nodes, : self.values.shape[2]]
+        found: Floats = self.values.reshape(len(self.values), -1) @ chosen.ravel()
+        return found
+
+    def fields(self, equilibrium: Equilibrium) -> NDArray[np.float64]:
+        """Return (k, N, b) the weights of all nodes; those of rotations are zero."""
+        count, _, dimension = self.values.shape
+        fields = equilibrium.fields(count)
+        rows, nodes = np.indices((count, len(self.nodes)))
+        np.add.at(fields[..., :dimension], (rows, self.nodes[nodes]), self.values)
+        return fields
+
+
 def linear(
-    fields: Callable[[Equilibrium], NDArray[np.float64]],
+    weights: Callable[[Problem], Weights],
 ) -> tuple[
     Callable[[Equilibrium], Measures],
     Callable[[Equilibrium, Measures], Slopes],
 ]:
-    """Return `Quantity.measure` and `Quantity.slopes` of sums of displacements.
-
-    Parameters
-    ----------
-    fields
-        Function from an equilibrium to the weights (k, N, b) of the displacements; those of
-        rotations are zero.
-    """
+    """Return `Quantity.measure` and `Quantity.slopes` of weighted sums of displacements."""
 
     def measure(equilibrium: Equilibrium) -> Measures:
-        dimension = equilibrium.problem.lattice.dimension
-        weights = fields(equilibrium)[..., :dimension]
-        return Measures(np.einsum("kna,na->k", weights, equilibrium.state.u[:, :dimension]))
+        return Measures(weights(equilibrium.problem).sums(equilibrium.state.u))
 
     def slopes(equilibrium: Equilibrium, _measures: Measures) -> Slopes:
-        return Slopes(fields(equilibrium))
+        return Slopes(weights(equilibrium.problem).fields(equilibrium))
 
     return measure, slopes
 

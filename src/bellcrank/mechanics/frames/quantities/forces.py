@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,16 +13,18 @@ from bellcrank.mechanics.frames.quantities.definition import (
     Measures,
     Quantity,
     Slopes,
+    Weights,
     linear,
     quantities,
 )
-from bellcrank.mechanics.frames.quantities.motion import along_field
+from bellcrank.mechanics.frames.quantities.motion import along_weights
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.mechanics.frames.equilibria import Equilibrium
     from bellcrank.mechanics.kernels.arrays import Floats
+    from bellcrank.model import Problem
 
     Values = NDArray[np.float64]
 
@@ -132,23 +135,23 @@ quantities.register("output_stiffness")(
 )
 
 
-def _force_on_stop(equilibrium: Equilibrium) -> Values:
-    """Return (1, N, b) the weights of the forces of the output on the springs that hold it."""
-    output = equilibrium.problem.output
+@lru_cache(maxsize=64)
+def _stop_weights(problem: Problem) -> Weights:
+    """Return the weights of the forces of the output on the springs that hold it."""
+    output, along = problem.output, along_weights(problem)
     assert output.spring is not None
-    return output.spring * len(output.nodes) * along_field(equilibrium)
+    return Weights(along.nodes, output.spring * len(output.nodes) * along.values)
 
 
-quantities.register("blocked_force")(Quantity(*linear(_force_on_stop), load="held output"))
+quantities.register("blocked_force")(Quantity(*linear(_stop_weights), load="held output"))
 
 
-def mean_displacement_fields(equilibrium: Equilibrium) -> Values:
-    """Return (d, N, b) the weights of the mean displacement of the output nodes."""
-    nodes, dimension = equilibrium.problem.output.nodes, equilibrium.problem.lattice.dimension
-    fields = equilibrium.fields(dimension)
-    for axis in range(dimension):
-        fields[axis, nodes, axis] = 1.0 / len(nodes)
-    return fields
+@lru_cache(maxsize=64)
+def mean_weights(problem: Problem) -> Weights:
+    """Return the weights of the mean displacement of the output nodes, d rows."""
+    nodes, dimension = problem.output.nodes, problem.lattice.dimension
+    rows = np.eye(dimension)[:, None] / len(nodes)
+    return Weights(nodes, np.broadcast_to(rows, (dimension, len(nodes), dimension)))
 
 
 def _sag(equilibrium: Equilibrium) -> Measures:
@@ -157,11 +160,11 @@ def _sag(equilibrium: Equilibrium) -> Measures:
     motion = equilibrium.solve(-equilibrium.residual() - load)
     if motion is None:
         return Measures(np.full(equilibrium.problem.lattice.dimension, math.nan))
-    return Measures(np.einsum("kna,na->k", mean_displacement_fields(equilibrium), motion), motion)
+    return Measures(mean_weights(equilibrium.problem).sums(motion), motion)
 
 
 def _sag_slopes(equilibrium: Equilibrium, measures: Measures) -> Slopes:
-    fields = mean_displacement_fields(equilibrium)
+    fields = mean_weights(equilibrium.problem).fields(equilibrium)
     return Slopes(fields, by_motion=None if measures.motion is None else fields)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from bellcrank.mechanics.frames.quantities.definition import (
     Measures,
     Quantity,
     Slopes,
+    Weights,
     linear,
     quantities,
     ratio,
@@ -23,33 +25,38 @@ if TYPE_CHECKING:
 
     from bellcrank.mechanics.frames.equilibria import Equilibrium
     from bellcrank.mechanics.kernels.arrays import Floats
+    from bellcrank.model import Problem
 
     Values = NDArray[np.float64]
 
 
-def output_fields(equilibrium: Equilibrium) -> Values:
-    """Return (1 + d, N, b) the weights of `bellcrank.mechanics.output.motion_weights`."""
-    weights = motion_weights(equilibrium.problem)
-    fields = equilibrium.fields(len(weights))
-    fields[:, equilibrium.problem.output.nodes, : weights.shape[2]] = weights
-    return fields
+@lru_cache(maxsize=64)
+def output_weights(problem: Problem) -> Weights:
+    """Return the weights of `bellcrank.mechanics.output.motion_weights`, 1 + d rows."""
+    return Weights(problem.output.nodes, motion_weights(problem))
 
 
-def along_field(equilibrium: Equilibrium) -> Values:
-    """Return (1, N, b) the weights of the mean displacement along the wanted direction."""
-    return output_fields(equilibrium)[:1]
+@lru_cache(maxsize=64)
+def along_weights(problem: Problem) -> Weights:
+    """Return the weights of the mean displacement of the output along the wanted direction."""
+    return Weights(problem.output.nodes, motion_weights(problem)[:1])
 
 
-def _along_and_input(equilibrium: Equilibrium) -> Values:
-    """Return (2, N, b) weights of the mean displacements of output and input."""
-    return np.concatenate([along_field(equilibrium), input_field(equilibrium)])
+@lru_cache(maxsize=64)
+def input_weights(problem: Problem) -> Weights:
+    """Return the weights of the mean displacement of the input along its direction."""
+    given = problem.input
+    return Weights(given.nodes, given.direction[None] / len(given.nodes))
 
 
-def input_field(equilibrium: Equilibrium) -> Values:
-    """Return (1, N, b) the weights of the mean displacement of the input along its direction."""
-    given, fields = equilibrium.problem.input, equilibrium.fields(1)
-    fields[0, given.nodes, : given.direction.shape[1]] = given.direction / len(given.nodes)
-    return fields
+@lru_cache(maxsize=64)
+def _along_and_input(problem: Problem) -> Weights:
+    """Return the weights of the mean displacements of output and input, two rows."""
+    both = along_weights(problem), input_weights(problem)
+    first, second = (len(each.nodes) for each in both)
+    values = np.zeros((2, first + second, problem.lattice.dimension))
+    values[0, :first], values[1, first:] = both[0].values[0], both[1].values[0]
+    return Weights(np.concatenate([each.nodes for each in both]), values)
 
 
 def _gain(means: Values) -> Values:
@@ -70,29 +77,27 @@ def _off_axis_gradient(means: Floats) -> Floats:
     return slope
 
 
-quantities.register("travel")(Quantity(*linear(along_field)))
+quantities.register("travel")(Quantity(*linear(along_weights)))
 quantities.register("gain")(
     Quantity(*linear(_along_and_input), combine=_gain, gradient=_gain_gradient)
 )
 quantities.register("off_axis")(
-    Quantity(*linear(output_fields), combine=off_axis_of, gradient=_off_axis_gradient)
+    Quantity(*linear(output_weights), combine=off_axis_of, gradient=_off_axis_gradient)
 )
 
 
-def _basis(dimension: int) -> Values:
-    """Return (k, d, d) matrices; products of a rotation with them are its measures.
-
-    In the plane cosine and sine, in space the components of the matrix.
-    """
-    if dimension == 2:
-        return np.array([[[1.0, 0.0], [0.0, 1.0]], [[0.0, -1.0], [1.0, 0.0]]])
-    return np.eye(9).reshape(9, 3, 3)
+BASES: dict[int, Values] = {
+    2: np.array([[[1.0, 0.0], [0.0, 1.0]], [[0.0, -1.0], [1.0, 0.0]]]),
+    3: np.eye(9).reshape(9, 3, 3),
+}
+"""Matrices (k, d, d) by dimension; products of a rotation with them are its measures: in the plane
+cosine and sine, in space the components of the matrix."""
 
 
 def _generators(dimension: int) -> Values:
     """Return (s, d, d) the derivatives of a rotation by spins about the axes."""
     if dimension == 2:
-        return _basis(2)[1:]
+        return BASES[2][1:]
     axes = np.eye(3)
     crossed: Values = np.cross(axes[:, None], axes).transpose(0, 2, 1)
     return crossed
@@ -109,13 +114,14 @@ def _rotation_measures(equilibrium: Equilibrium) -> Measures:
     else:
         displacement = equilibrium.state.u[nodes, : lattice.dimension]
         matrix = turned_positions(lattice.positions[nodes], displacement)
-    return Measures((_basis(lattice.dimension) * matrix).sum(axis=(1, 2)))
+    basis = BASES[lattice.dimension]
+    return Measures(basis.reshape(len(basis), -1) @ matrix.ravel())
 
 
 def _rotation_slopes(equilibrium: Equilibrium, _measures: Measures) -> Slopes:
     lattice, nodes = equilibrium.problem.lattice, equilibrium.problem.output.nodes
     dimension = lattice.dimension
-    basis = _basis(dimension)
+    basis = BASES[dimension]
     fields = equilibrium.fields(len(basis))
     if len(nodes) == 1:
         turned = _generators(dimension) @ orientation(equilibrium.state, nodes[0])
@@ -128,9 +134,10 @@ def _rotation_slopes(equilibrium: Equilibrium, _measures: Measures) -> Slopes:
 
 def _angle(measures: Values) -> Values:
     """Return the angle in the plane, the size of the rotation vector in space, degrees."""
-    dimension = 2 if measures.shape[-1] == 2 else 3
-    turn = rotation_of(np.einsum("...k,kij->...ij", measures, _basis(dimension)))
-    return turn if dimension == 2 else np.asarray(np.linalg.norm(turn, axis=-1))
+    if measures.shape[-1] == 2:
+        return np.asarray(np.degrees(np.arctan2(measures[..., 1], measures[..., 0])))
+    turn = rotation_of(measures.reshape(*measures.shape[:-1], 3, 3))
+    return np.asarray(np.linalg.norm(turn, axis=-1))
 
 
 def _angle_gradient(measures: Floats) -> Floats:
