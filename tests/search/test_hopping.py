@@ -11,7 +11,7 @@ import pytest
 
 from bellcrank.errors import InvalidSettings
 from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator, Status
-from bellcrank.model import Problem, find_problem, unpack_mask
+from bellcrank.model import Problem, find_problem, pack_mask, unpack_mask
 from bellcrank.model.builtin.scaling import scaling
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search import (
@@ -350,6 +350,19 @@ def test_a_first_local_search_without_result_is_not_repeated(small: Problem) -> 
     assert (masks == first_row).all(axis=1).sum() == 1
     assert parts[-1][0].local_searches > 1
     assert (unpack_mask(parts[-1][0].mask, small.lattice.beam_count) == small.initial).all()
+
+
+def test_a_first_local_search_that_cannot_be_resumed_is_not_repeated(small: Problem) -> None:
+    settings = HoppingSettings(steps=2000, phase_steps=0)
+    evaluator = make_evaluator(small, settings)
+    first = start_chain(evaluator, settings, 0)
+    # A design may be stable next to its reference, and not from rest.
+    nothing = np.zeros(small.lattice.beam_count, dtype=bool)
+    state = replace(first, step=250, search_mask=pack_mask(nothing), failed=(), batch=1)
+    after, proposals = advance_chain(evaluator, settings, 0, state)
+    assert after.local_searches >= 1
+    # The next one begins with a perturbation of the best design, not with that design again.
+    assert flips(proposals.mask[0], first.mask, small) > 0
 
 
 def test_a_run_shorter_than_one_local_search_still_accepts_a_design(small: Problem) -> None:

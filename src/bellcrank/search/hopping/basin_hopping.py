@@ -304,6 +304,9 @@ def advance(
     hopping = BasinHopping(evaluator, settings, limits, state, rng, last)
     if state.search_mask is not None:
         hopping.resume_local_search(state.search_mask, state.failed, state.batch)
+        if hopping.local is None:
+            # Stable next to its reference, but not from rest: this local search is over.
+            hopping.state = replace(state, local_searches=state.local_searches + 1)
     while hopping.state.step < last:
         hopping.advance()
     local = hopping.local

@@ -14,6 +14,7 @@ from bellcrank.mechanics.frames.kernels.arrays import POINTS, State
 from bellcrank.mechanics.frames.kernels.assembly import stiffness_is_definite
 from bellcrank.mechanics.frames.kernels.newton import newton
 from bellcrank.mechanics.frames.kernels.path import (
+    DIP,
     FEW_SWEEPS,
     LONGEST_STEP,
     departure_of,
@@ -32,7 +33,7 @@ from bellcrank.mechanics.frames.kernels.state import (
 )
 from bellcrank.mechanics.frames.kernels.structure import place_followers
 from bellcrank.mechanics.kernels._compile import inlined, kernel
-from bellcrank.mechanics.kernels.arrays import CONVERGED
+from bellcrank.mechanics.kernels.arrays import CONVERGED, SNAPPED, UNCONVERGED
 from bellcrank.mechanics.kernels.fields import clear, copy, copy_row
 
 if TYPE_CHECKING:
@@ -61,57 +62,67 @@ POINT_TOLERANCE = 1e-4
 
 
 @kernel
-def follows_reference(  # noqa: PLR0911 - one test after the other
+def follow_reference(  # noqa: PLR0911 - one test after the other
     frame: Frame,
     mask: Bytes,
     structure: Structure,
     reference: Reference,
     state: State,
     memory: Memory,
-) -> bool:
-    """Whether an equilibrium at full load is on a stable path next to that of the reference.
+) -> int:
+    """Return whether an equilibrium at full load is on a stable path next to that of the reference.
 
-    The path of the reference, or of a design before it, was followed from rest. True if the design
-    has equilibria near all its states, is not much softer there, and moves and softens between
-    them as a path may. The current factor must be that of `state`. The states found are left in
-    `memory.points`.
+    The path of the reference, or of a design before it, was followed from rest. CONVERGED if the
+    design has equilibria near all its states, is not much softer there, and moves and softens
+    between them as a path may. SNAPPED if one of these equilibria is as soft as that of a design
+    that snaps (`path.DIP`). Otherwise UNCONVERGED: the path must be followed. The current factor
+    must be that of `state`. The states found are left in `memory.points`.
     """
     if reference.count[1]:
-        return False
+        return UNCONVERGED
     last = reference.count[0] + 1
     memory.count[0], memory.count[1] = reference.count[0], 0
     copy_row(memory.tension, memory.point_tension[POINTS])
     if not is_near(frame, structure, reference, last, reference.state, state, memory):
-        return False
+        return UNCONVERGED
     begin_changes(structure, reference, memory)
     before = reference.load[last - 2] if last > 1 else 0.0
     find_tangent(frame, structure, state, 0.5 * (before + 1.0), memory.last_tangent, memory)
     rest = memory.previous
     set_to_rest(rest)
     if not stiffness_is_definite(frame, structure, 0.0, rest, memory):
-        return False
+        return UNCONVERGED
     find_softest(frame, structure, reference, 0, memory)
     following = reference.load[0] if last > 1 else 1.0
     find_tangent(frame, structure, rest, 0.5 * following, memory.tangent, memory)
-    least = CLEAR_DIP * min(memory.point_stiffness[0], memory.point_stiffness[last])
-    before = 0.0
+    stiffness = memory.point_stiffness
+    ends = min(stiffness[0], stiffness[last])
+    before, softest = 0.0, ends
     for index in range(1, last + 1):
         load = 1.0
         if index < last:
             load = memory.load[index - 1] = reference.load[index - 1]
             predict_changes(structure, (load - before) / (1.0 - before), memory)
-            if not follow_point(frame, mask, structure, reference, index, load, memory):
-                return False
-        if memory.point_stiffness[index] < least:
-            return False
-        if not is_next(frame, structure, index, before, load, state, memory):
-            return False
+            stiffness[index] = math.inf
+            near = follow_point(frame, mask, structure, reference, index, load, memory)
+            if stiffness[index] <= DIP * ends:
+                memory.reached_load[0], memory.reached_load[1] = 1.0, stiffness[index] / ends
+                return SNAPPED
+            if not near:
+                return UNCONVERGED
+        departure = departure_before(frame, structure, index, before, load, state, memory)
+        first, second = stiffness[index - 1], stiffness[index]
+        followed = second > SOFTENING * first and first > SOFTENING * second
+        if departure > DEPARTURE or not (followed or is_fine(load - before)):
+            return UNCONVERGED
+        softest = min(softest, second)
         copy(memory.next_tangent, memory.tangent)
         if is_kink(frame, load):
             following = reference.load[index] if index + 1 < last else 1.0
             turn_tangent(frame, structure, index, 0.5 * (load + following), memory)
         before = load
-    return lowest_between(frame, memory) > CLEAR_KINK / CLEAR_DIP * least
+    clear = softest >= CLEAR_DIP * ends and lowest_between(frame, memory) > CLEAR_KINK * ends
+    return CONVERGED if clear else UNCONVERGED
 
 
 @kernel
@@ -158,7 +169,7 @@ def lowest_between(frame: Frame, memory: Memory) -> float:
 
 
 @kernel
-def is_next(
+def departure_before(
     frame: Frame,
     structure: Structure,
     index: int,
@@ -166,8 +177,8 @@ def is_next(
     load: float,
     state: State,
     memory: Memory,
-) -> bool:
-    """Whether a state follows from the one before; computes its tangent in `memory.next_tangent`.
+) -> float:
+    """Return the departure from the state before; computes the tangent in `memory.next_tangent`.
 
     `before` and `load` are the loads of both, and `state` is that at full load. The current factor
     must be that of the state otherwise.
@@ -185,12 +196,9 @@ def is_next(
         here = State(u, q)
         difference(start, here, memory.difference)
         find_tangent(frame, structure, here, 0.5 * (before + load), memory.next_tangent, memory)
-    departure = departure_of(
+    return departure_of(
         frame, structure, memory.difference, memory.tangent, memory.next_tangent, load - before
     )
-    first, second = memory.point_stiffness[index - 1], memory.point_stiffness[index]
-    followed = second > SOFTENING * first and first > SOFTENING * second
-    return departure <= DEPARTURE and (followed or is_fine(load - before))
 
 
 @kernel

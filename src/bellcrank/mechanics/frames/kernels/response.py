@@ -24,7 +24,7 @@ from bellcrank.mechanics.frames.kernels.beams import dimension
 from bellcrank.mechanics.frames.kernels.newton import newton
 from bellcrank.mechanics.frames.kernels.path import LONGEST_STEP, follow_path, lowest_stiffness
 from bellcrank.mechanics.frames.kernels.reference_path import (
-    follows_reference,
+    follow_reference,
     known_tension,
     place_new_nodes,
 )
@@ -167,9 +167,10 @@ def find_response(
             return UNVERIFIED, efficiency_of(frame, state.u)
         if status != CONVERGED and lower_bound > -math.inf:
             return status, math.nan
-    if status == CONVERGED and follows_reference(frame, mask, structure, reference, state, memory):
-        memory.path[0] = NEXT_PATH
-    else:
+    if status == CONVERGED:
+        status = follow_reference(frame, mask, structure, reference, state, memory)
+        memory.path[0] = NEXT_PATH if status == CONVERGED else NO_PATH
+    if status == UNCONVERGED:
         status = follow_path(frame, structure, state, memory, largest_increment)
         memory.path[0] = OWN_PATH if status == CONVERGED else NO_PATH
     reached = 1.0 if memory.path[0] else memory.reached_load[0]
