@@ -180,19 +180,20 @@ class FrameRefinement:
                 first_region=REPAIR_REGION * left.first_region,
                 largest_region=REPAIR_REGION * left.largest_region,
             )
-        path = []
+        last: Progress | None = None
+        vectors: list[Values] = []
         for progress in refine_rows(evaluator, left, vector):
-            path.append(progress)
+            # The rows of earlier steps would take gigabytes over tolerances.
+            last = progress
+            vectors.append(progress.vector)
             self.report_progress(progress)
             is_met = progress.rows.violation < MET
             if not self.goes_on or (is_met and (near or self._is_ample(progress))):
                 break
-        if not path:
+        if last is None:
             return None
-        last = path[-1]
         self.reason = last.reason or ("stopped" if not self.goes_on else "all items are met")
         self.steps, self.evaluations = self.steps + last.step, self.evaluations + last.evaluations
-        vectors = [each.vector for each in path]
         state, number = latest_met(self.variables, self.design.mask, vectors)
         self.tried = vectors[: number + 1]
         state = self._with_robustness(state, vectors[number])
