@@ -419,6 +419,12 @@ def test_the_tolerance_of_a_design_is_shown_and_it_is_compared_with_another(
     note.wait_for()
     assert re.search(r"\d × \d+(\.\d)? × 5\.1 mm, \d+\.\d g", note.inner_text())
     assert note.inner_text().split("Centres")[1].count("(") == 2
+    assert page.locator(".player .printed").get_attribute("d").count("M") > 10
+    assert page.locator(".player .screw").get_attribute("d").count("M") == 2
+    worst = page.locator(".items.tolerance .worst").first.inner_text()
+    assert re.search("^worst: widths .*, direction .*, stroke .*, prints ", worst)
+    moving = page.get_by_text("It moves within").inner_text()
+    assert re.search(r"It moves within \d+(\.\d)? × \d+(\.\d)? mm", moving)
     page.get_by_label("Compare with").select_option("builtin/human-crane")
     table = page.locator(".compare .figures.part")
     table.wait_for()
