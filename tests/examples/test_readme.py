@@ -116,6 +116,28 @@ def test_the_part_of_the_readme_is_that_of_its_record() -> None:
     assert all(each["met"] for each in reached.values())
 
 
+def test_the_part_on_the_front_of_the_readme_is_that_of_its_record() -> None:
+    folder = README.parent / "docs" / "start"
+    text = " ".join(README.read_text(encoding="utf-8").split())
+    record = json.loads((folder / "crane-summary.json").read_text())
+    (figures,) = record["part_figures"]
+    sheet = json.loads((folder / "crane-validation.json").read_text())
+    (plane,) = [each for each in sheet["results"] if each["level"] == "plane"]
+    reached = {each["quantity"]: each["reached"]["sheet"] for each in sheet["specification"]}
+    assert all(each["met"] for each in reached.values())
+    assert record["refinement"]["met_after"]
+    assert f"moves its output by {figures['travel_mm']:.1f} mm" in text
+    gain, own = figures["efficiency"], plane["efficiency"]
+    assert f"{gain:.1f} times as far as the input ({own:.1f} in finite elements" in text
+    aside, own = figures["off_axis"], reached["off_axis"]["value"]
+    assert f"at most {100.0 * aside:.1f} % of that ({100.0 * own:.1f} %)" in text
+    turn, own = figures["rotation_deg"], abs(reached["rotation"]["value"])
+    assert f"turns by {turn:.1f} degrees ({own:.1f})" in text
+    grams = [1000.0 * figures[name] / GRAVITY for name in ("payload_N", "dead_load_N")]
+    assert f"sags by {figures['sag_mm']:.1f} mm" in text
+    assert f"to {grams[0]:.0f} g, or {grams[1]:.0f} g hung on before the push" in text
+
+
 def test_every_command_is_known_with_all_its_options(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
