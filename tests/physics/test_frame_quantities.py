@@ -19,6 +19,7 @@ from bellcrank.mechanics import (
     quantities,
 )
 from bellcrank.mechanics.frames.kernels.arrays import KEPT_PATH, NEXT_PATH
+from bellcrank.mechanics.frames.kernels.path import DIP
 from bellcrank.model import (
     Elasticity,
     Input,
@@ -27,6 +28,7 @@ from bellcrank.model import (
     Problem,
     Section,
     Supports,
+    gallery_design,
     human_design,
 )
 from bellcrank.part import PartSpec, frame_problem
@@ -306,6 +308,27 @@ def test_warm_starts_give_the_quantities_from_rest() -> None:
         scale = np.abs(slopes).max(axis=2, keepdims=True)
         assert (np.abs(warm.sensitivity() - slopes) <= 1e-5 * scale).all()
     assert codes >= {NEXT_PATH, KEPT_PATH}
+
+
+def test_flips_that_are_refused_beside_the_reference_snap_from_rest_too() -> None:
+    design = gallery_design("machine", "scaling-8")
+    assert design is not None
+    problem = frame_problem(design.problem, PartSpec())
+    warm, cold = FrameEvaluator(problem), FrameEvaluator(problem)
+    assert warm.evaluate(design.mask).status is Status.CONVERGED
+    warm.set_reference()
+    refused = 0
+    for beam in problem.designable:
+        flipped = design.mask.copy()
+        flipped[beam] ^= True
+        found, expected = warm.evaluate(flipped, warm_start=True), cold.evaluate(flipped)
+        assert (found.status is Status.CONVERGED) == (expected.status is Status.CONVERGED)
+        if found.status is Status.SNAPPED:
+            # Beside the reference the first state that is too soft is known, not the softest one.
+            (_, first), (_, softest) = warm.memory.reached_load, cold.memory.reached_load
+            refused += first > softest
+            assert softest <= first <= DIP
+    assert refused > 0
 
 
 @pytest.mark.parametrize("problem", [actuator, block])

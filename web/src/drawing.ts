@@ -178,15 +178,15 @@ export class Drawing implements LatticeDrawing {
     path.setAttribute("d", this.lines(beams, this.rest));
   }
 
-  /** Fill an outline at rest below the beams, mark screw holes of a radius above them, and make room for all. */
-  printed(loops: Point[][], screws: Point[], hole: number): void {
+  /** Fill an outline at rest below the beams, draw its holes for screws above them, and make room for all. */
+  printed(loops: Point[][], screws: Point[][]): void {
     if (!this.outline.parentNode) {
       this.under.prepend(this.outline);
       this.overlay.append(this.screws);
     }
-    this.outline.setAttribute("d", loops.map((loop) => `M${loop.map(([x, y]) => `${x.toFixed(3)} ${(-y).toFixed(3)}`).join("L")}Z`).join(""));
-    const [r, d] = [hole.toFixed(3), (2 * hole).toFixed(3)];
-    this.screws.setAttribute("d", screws.map(([x, y]) => `M${(x - hole).toFixed(3)} ${(-y).toFixed(3)}a${r} ${r} 0 1 0 ${d} 0a${r} ${r} 0 1 0 -${d} 0Z`).join(""));
+    const closed = (loop: Point[]): string => `M${loop.map(([x, y]) => `${x.toFixed(3)} ${(-y).toFixed(3)}`).join("L")}Z`;
+    this.outline.setAttribute("d", loops.map(closed).join(""));
+    this.screws.setAttribute("d", screws.map(closed).join(""));
     this.enlarge(loops.flat());
   }
 

@@ -13,8 +13,6 @@ export interface Picture { points: number[]; cells: number[]; corners: number; s
 export interface Sensitivity { efficiency: number; beams: number[]; change: (number | null)[] }
 
 const PERIOD = 3200;
-/** Radius of screw holes, mm. */
-const SCREW = 1.7;
 
 export class Player {
   private drawing: LatticeDrawing | null = null;
@@ -43,7 +41,7 @@ export class Player {
   private losses: ToleranceFound["losses"] | null = null;
   private picture: Picture | null = null;
   private outline: Point[][] = [];
-  private screws: Point[] = [];
+  private screws: Point[][] = [];
   private shares = new Float64Array(0);
   /** Called when the stress is selected before it is computed. */
   onStressRequested: () => void = () => {};
@@ -87,7 +85,7 @@ export class Player {
     drawing.ghost("rest", this.beams);
     if (drawing instanceof Drawing) {
       drawing.overlay.append(this.stress);
-      drawing.printed(this.outline, this.screws, SCREW / this.scale);
+      drawing.printed(this.outline, this.screws);
       drawing.dimensions(this.scale);
     }
     drawing.element.addEventListener("pointermove", (event) => this.point(event as PointerEvent));
@@ -171,12 +169,11 @@ export class Player {
     return [...others, { name: "touching", beams: this.beams.filter((beam) => this.touching.has(beam)) }];
   }
 
-  /** Draw the outline of the printed part at rest, with its plate, screw holes and pads; `scale` is the length of a unit in mm. */
-  showOutline(loops: Point[][], screws: Point[], scale: number): void {
-    const inUnits = ([x, y]: Point): Point => [x / scale, y / scale];
-    this.outline = loops.map((loop) => loop.map(inUnits));
-    this.screws = screws.map(inUnits);
-    if (this.drawing instanceof Drawing) this.drawing.printed(this.outline, this.screws, SCREW / scale);
+  /** Draw the outline of the printed part at rest, whose last loops are screw holes; `scale` is the length of a unit in mm. */
+  showOutline(loops: Point[][], screws: number, scale: number): void {
+    this.outline = loops.map((loop) => loop.map(([x, y]): Point => [x / scale, y / scale]));
+    this.screws = this.outline.slice(this.outline.length - screws);
+    if (this.drawing instanceof Drawing) this.drawing.printed(this.outline, this.screws);
   }
 
   showStress(picture: Picture | null): void {

@@ -29,7 +29,7 @@ export interface Subject {
 }
 
 interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null; items: ItemState[] | null; figures: PartFigures[] | null }
-interface Remarks { size: [number, number, number]; /** Box that holds the part along the stroke, mm. */ swept: number[]; volume: number; mass: number | null; stroke: number | null; remarks: string[]; touching: number[]; /** Centres of screw holes, mm. */ screws: Point[]; /** Loops of the outline with plate and pads, mm. */ outline: Point[][] }
+interface Remarks { size: [number, number, number]; /** Box that holds the part along the stroke, mm. */ swept: number[]; volume: number; mass: number | null; stroke: number | null; remarks: string[]; touching: number[]; /** Centres of screw holes, mm. */ screws: Point[]; /** Loops of the outline with plate and pads, mm; the last are the screw holes. */ outline: Point[][] }
 interface Print { minutes: number | null; layers: number; layer_mm: number; mass: number | null; slicer: string; profile: string }
 
 /** The level of the printed body, in which a specification is checked; that of a part in space takes minutes. */
@@ -514,7 +514,7 @@ export class Result {
     const { problem, mask } = this.subject;
     const { grips } = this;
     this.gripped = null;
-    if (!this.hasGrips) { this.player.showOutline([], [], this.part.scale); return; }
+    if (!this.hasGrips) { this.player.showOutline([], 0, this.part.scale); return; }
     let found: Remarks | string;
     try {
       found = await post<Remarks>("/part", { problem, mask, part: this.part, ...grips });
@@ -523,8 +523,8 @@ export class Result {
     }
     if (grips !== this.grips) return;
     this.gripped = found;
-    if (typeof found === "string") this.player.showOutline([], [], this.part.scale);
-    else this.player.showOutline(found.outline, found.screws, this.part.scale);
+    if (typeof found === "string") this.player.showOutline([], 0, this.part.scale);
+    else this.player.showOutline(found.outline, found.screws.length, this.part.scale);
     this.showFiles();
   }
 

@@ -71,8 +71,7 @@ class BentStruts:
             self.pieces = np.column_stack([first, second])
         else:
             middle = len(positions) + np.arange(len(beams))
-            ends = np.column_stack([np.append(first, middle), np.append(middle, second)])
-            self.pieces = ends
+            self.pieces = np.column_stack([np.append(first, middle), np.append(middle, second)])
 
     def points(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return (N + n, d) the nodes and the points in the middle; in space (N, d).

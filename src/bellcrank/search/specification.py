@@ -132,10 +132,9 @@ class SpecificationEvaluator:
         self.violations = np.ones(len(self.items))
         self._bounds = Bounds.of_all(self.items)
         # Items whose margins count where there is no objective.
-        self._in_margin = np.array(
-            [bool(each.case and channels_of(each.quantity, each.output)) for each in self.items],
-            dtype=bool,
-        )
+        self._in_margin = [
+            bool(each.case and channels_of(each.quantity, each.output)) for each in self.items
+        ]
         evaluators = {name: case.evaluator for name, case in self.cases.items()}
         self._given = GivenQuantities(self.problem, self.items, evaluators, elements, gap)
 

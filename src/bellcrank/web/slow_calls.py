@@ -169,7 +169,8 @@ def part_summary(
     dict
         Lengths in mm, ``volume`` in cm³, ``mass`` in g; ``swept``, the box that holds the part
         along the stroke; ``screws``, the centres of screw holes in the coordinates of the files;
-        ``outline``, the loops of the outline in the same coordinates if there are additions.
+        ``outline``, the loops of the outline in the same coordinates if there are additions,
+        those of screw holes last.
     """
     from bellcrank.part import PartSpec
     from bellcrank.workflows.fabricate import (

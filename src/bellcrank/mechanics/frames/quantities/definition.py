@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -127,12 +128,13 @@ def linear(
     Callable[[Equilibrium, Measures], Slopes],
 ]:
     """Return `Quantity.measure` and `Quantity.slopes` of weighted sums of displacements."""
+    stored = lru_cache(maxsize=64)(weights)
 
     def measure(equilibrium: Equilibrium) -> Measures:
-        return Measures(weights(equilibrium.problem).sums(equilibrium.state.u))
+        return Measures(stored(equilibrium.problem).sums(equilibrium.state.u))
 
     def slopes(equilibrium: Equilibrium, _measures: Measures) -> Slopes:
-        return Slopes(weights(equilibrium.problem).fields(equilibrium))
+        return Slopes(stored(equilibrium.problem).fields(equilibrium))
 
     return measure, slopes
 

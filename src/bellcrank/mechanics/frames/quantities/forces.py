@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -135,7 +134,6 @@ quantities.register("output_stiffness")(
 )
 
 
-@lru_cache(maxsize=64)
 def _stop_weights(problem: Problem) -> Weights:
     """Return the weights of the forces of the output on the springs that hold it."""
     output, along = problem.output, along_weights(problem)
@@ -146,7 +144,6 @@ def _stop_weights(problem: Problem) -> Weights:
 quantities.register("blocked_force")(Quantity(*linear(_stop_weights), load="held output"))
 
 
-@lru_cache(maxsize=64)
 def mean_weights(problem: Problem) -> Weights:
     """Return the weights of the mean displacement of the output nodes, d rows."""
     nodes, dimension = problem.output.nodes, problem.lattice.dimension

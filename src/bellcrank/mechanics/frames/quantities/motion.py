@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,26 +29,22 @@ if TYPE_CHECKING:
     Values = NDArray[np.float64]
 
 
-@lru_cache(maxsize=64)
 def output_weights(problem: Problem) -> Weights:
     """Return the weights of `bellcrank.mechanics.output.motion_weights`, 1 + d rows."""
     return Weights(problem.output.nodes, motion_weights(problem))
 
 
-@lru_cache(maxsize=64)
 def along_weights(problem: Problem) -> Weights:
     """Return the weights of the mean displacement of the output along the wanted direction."""
     return Weights(problem.output.nodes, motion_weights(problem)[:1])
 
 
-@lru_cache(maxsize=64)
 def input_weights(problem: Problem) -> Weights:
     """Return the weights of the mean displacement of the input along its direction."""
     given = problem.input
     return Weights(given.nodes, given.direction[None] / len(given.nodes))
 
 
-@lru_cache(maxsize=64)
 def _along_and_input(problem: Problem) -> Weights:
     """Return the weights of the mean displacements of output and input, two rows."""
     both = along_weights(problem), input_weights(problem)
