@@ -133,6 +133,7 @@ def _result(page: Any, address: str, run: str) -> dict[str, Any]:
     row: dict[str, Any] = {}
     _until(lambda: "being computed" not in _verdict(page))  # in the 2D solid, at once
     row["verdict"] = _verdict(page)
+    row["missed"] = page.locator('[aria-label="Result"] tr.missed').all_inner_texts()
     report = httpx.post(f"{address}/api/report", json=body, timeout=300).json()
     row["refined"] = "refinement" in data["provenance"]
     row["figures"] = [{key: each.get(key) for key in FIGURES} for each in report["figures"]]

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bellcrank.errors import InvalidSettings
-from bellcrank.model import Design, Stiffness, find_problem, gallery_design
-from bellcrank.part import PartSpec
+from bellcrank.model import Design, find_problem, gallery_design
+from bellcrank.part import PartSpec, frame_problem
 from bellcrank.plots import Motion, style
 from reproduction import published
 from reproduction.finite_elements import analyse_all
@@ -18,7 +18,7 @@ from reproduction.formatting import count, number, percent
 from reproduction.pictures.charts import Chart, Series
 from reproduction.pictures.sheets import Sheet, draw_sheet
 from reproduction.registry import Claim, Figures, Study, register
-from reproduction.searching import best_design, design_of, respond, run_chains
+from reproduction.searching import best_design, design_with, geometry_of, respond, run_chains
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -34,7 +34,7 @@ ORIGINS = {
 }
 """Origins of the designs, with a title and a short label."""
 MODELS = {
-    "discrete": ("discrete model", style.INK),
+    "search": ("model of the search", style.INK),
     "frame": ("nonlinear frame", style.BEST),
     "plane": ("plane stress", style.BUILT),
 }
@@ -95,20 +95,18 @@ def run(settings: Settings, store: ResultStore) -> Figures:
             "default": {"chains": settings.chains, "steps": settings.steps},
         },
         "designs": {
-            origin: {**_discrete(design), **parts[origin]} for origin, design in designs.items()
+            origin: {**_as_searched(design), **parts[origin]} for origin, design in designs.items()
         },
     }
 
 
-def _discrete(design: Design) -> dict[str, Any]:
-    """Return a design and its response in the discrete model as plain data."""
+def _as_searched(design: Design) -> dict[str, Any]:
+    """Return a design and its response in the model of its search as plain data."""
     response = respond(design)
-    stiffness = design.problem.stiffness
     return {
-        "mask": design.mask_hex,
+        **geometry_of(design),
         "beams": design.beam_count,
-        "stiffness": [stiffness.bond, stiffness.angle],
-        "discrete": {
+        "search": {
             "efficiency": response.efficiency if response.is_admissible else None,
             "status": response.status.label,
         },
@@ -116,11 +114,11 @@ def _discrete(design: Design) -> dict[str, Any]:
 
 
 def design_from(figures: Mapping[str, Any], origin: str) -> Design:
-    """Return a design of a record."""
-    row = figures["designs"][origin]
-    bond, angle = row["stiffness"]
+    """Return a design of a record; only that for given struts is a frame."""
     problem = find_problem(figures["problem"])
-    return design_of(replace(problem, stiffness=Stiffness(bond, angle)), row["mask"])
+    if origin == "part":
+        problem = frame_problem(problem, PartSpec(width=figures["width"]))
+    return design_with(problem, figures["designs"][origin])
 
 
 def efficiency(figures: Mapping[str, Any], origin: str, model: str) -> float | None:
@@ -170,8 +168,8 @@ def draw(figures: Mapping[str, Any], path: Path, title: str, reported: tuple[flo
     highest = max(float(np.max(each.y)) for each in series)
     searches = figures["searches"]
     chart = Chart(
-        f"Efficiency in the discrete model and by finite elements (struts {figures['width']:g} mm "
-        "wide, spacing 10 mm), and the paper's values",
+        "Efficiency in the model of the search and by finite elements (struts "
+        f"{figures['width']:g} mm wide, spacing 10 mm), and the paper's values",
         "", "efficiency", series,
         names=[*(ORIGINS[origin][1] for origin in order), "paper, human", "paper, machine"],
         legend="upper right", limits_y=(None, 1.12 * highest),
@@ -258,6 +256,8 @@ def _ratios(figures: Mapping[str, Any]) -> list[str]:
             continue
         texts = []
         for model in _models_in(figures):
+            if (origin, model) == ("part", "search"):
+                continue  # a frame; the human design is in the discrete model
             machine, hand = (efficiency(figures, one, model) for one in (origin, "hand"))
             if machine is not None and hand:
                 texts.append(f"{machine / hand:.1f} ({MODELS[model][0]})")
@@ -285,9 +285,9 @@ DISPLACED = (
         "frames, and the printed outline in plane stress, both nonlinear."
     ),
     (
-        "The designs for 2 mm struts were searched with the stiffness of such struts and without "
-        "contact of struts; the others with the paper's stiffness, which corresponds to wider "
-        "struts."
+        "The model of the search is the discrete model with the paper's stiffness, which "
+        "corresponds to wider struts; for 2 mm struts it is a frame with one element in each "
+        "strut, without contact of struts."
     ),
 )
 FORCED = (
@@ -297,6 +297,7 @@ FORCED = (
         "paper's human design, recomputed from a description, has efficiency 0.2211."
     ),
     "The paper's values for pliers are simulated.",
+    "For 2 mm struts the model of the search is a frame with one element in each strut.",
     "Designs that snap as frames were not analysed in plane stress.",
 )
 

@@ -48,7 +48,7 @@ class Settings:
 
 
 def run(settings: Settings, store: ResultStore) -> Figures:
-    """Compute each design along the stroke, in the discrete model and as a frame."""
+    """Compute each design along the stroke, in the model of its search and as a frame."""
     strokes = np.linspace(0.0, settings.furthest, settings.points + 1)[1:].tolist()
     tasks: dict[str, Any] = {}
     for name in settings.problems:
@@ -87,7 +87,7 @@ def _designs(name: str, settings: Settings, store: ResultStore) -> dict[str, Des
 
 
 def along(design: Design, strokes: list[float]) -> dict[str, Any]:
-    """Return efficiencies in the discrete model, and the first loss of stability.
+    """Return efficiencies in the model of the search, and the first loss of stability.
 
     Efficiencies after a loss of stability are None, because the response is not unique.
     """

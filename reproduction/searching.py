@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, SpringEvaluator, Status
+from bellcrank.mechanics import VERIFICATION_INCREMENT, Response, Status, model_evaluator
 from bellcrank.model import Design, unpack_mask
 from bellcrank.plots.downsampling import downsample
 from bellcrank.search import (
@@ -179,9 +179,9 @@ def design_with(problem: Problem, geometry: Mapping[str, Any]) -> Design:
 
 
 def respond(design: Design, part_of_stroke: float = 1.0) -> Response:
-    """Return the response of a design from rest with small increments."""
+    """Return the response of a design from rest with small increments, in its own model."""
     problem = design.problem
     if part_of_stroke != 1.0:
         given = replace(problem.input, amount=part_of_stroke * problem.input.amount)
         problem = replace(problem, input=given)
-    return SpringEvaluator(problem).evaluate(design.mask, VERIFICATION_INCREMENT)
+    return model_evaluator(problem).evaluate(design.mask, VERIFICATION_INCREMENT)

@@ -256,17 +256,6 @@ def shipped() -> Rows:
         yield row("R²", *(f"{each['r_squared']:.3f}" for each in epochs))
 
 
-def training_set_size() -> Rows:
-    found: dict[tuple[str, int], Any] = {}
-    for told in read("surrogate/training-set-size")["rows"]:
-        runs = next(size for size in (25, 100, 400) if told["runs"] <= size)
-        found[told["model"], runs] = f"{told['r_squared']:.2f} ({told['seconds']:.0f})"
-    for model in ("linear", "mlp", "resnet18-w16"):
-        name = "linear in the bits" if model == "linear" else f"`{model}`"
-        cells = [found.get((model, runs), "") for runs in (25, 100, 400)]
-        yield row(name, *cells).replace("|  |", "| |")
-
-
 def surrogate_search() -> Rows:
     medians = read("surrogate/surrogate-search")["medians"]
     for name, words in (("final", "last"), ("verified", "best of ten as verified")):
@@ -336,7 +325,7 @@ TABLES: dict[str, tuple[Callable[[], Rows], ...]] = {
     "refinement": (equal_mass, refined_specifications),
     "space": (space,),
     "machines": (bundled, contact, entries, lengths, two_ports),
-    "surrogate": (costs, shipped, training_set_size, surrogate_search, long_runs),
+    "surrogate": (costs, shipped, surrogate_search, long_runs),
 }
 
 
