@@ -160,8 +160,10 @@ def design_of(problem: Problem, mask: str) -> Design:
 
 
 def geometry_of(design: Design) -> dict[str, Any]:
-    """Return beams, positions and widths of a design as plain data."""
+    """Return beams, and positions and widths of a frame, as plain data."""
     problem = design.problem
+    if problem.section is None:
+        return {"mask": design.mask_hex}
     return {
         "mask": design.mask_hex,
         "positions": problem.lattice.positions.round(6).tolist(),
