@@ -161,7 +161,7 @@ def _measurements() -> Iterator[tuple[str, str, str, str]]:
     ratios = [own["nominal"][each]["rms"] / bars["nominal"][each]["rms"] for each in SETS]
     yield (
         "Linear frames, effect of each strut on the output",
-        "the same lattice; error over that of linear springs",
+        "the same lattice; error over that of hinged bars",
         ", ".join(f"{each:.2f}" for each in ratios),
         "[a measured lattice](measured.md)",
     )
