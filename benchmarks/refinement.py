@@ -1,6 +1,6 @@
 """What refinement gains: ``python -m benchmarks.refinement``.
 
-Four comparisons, by frames with eight elements in each strut and in the sheet, and a cost:
+Three comparisons, by frames with eight elements in each strut and in the sheet, and a cost:
 
 - ``mass``: the bundled parts, and designs searched for the largest gain in the 24 directions and
   sizes of the library, refined at equal mass, equal least width and without contact; gain before
@@ -11,8 +11,6 @@ Four comparisons, by frames with eight elements in each strut and in the sheet, 
   sheet too, as by `bellcrank design`.
 - ``exact``: the slider with a gain of 3.0 within 0.1 %, an off-axis motion below 1 % and a rotation
   below 0.5 degrees, from searches with several seeds.
-- ``path``: the tasks with a path, from searches with several seeds; the error of the path after the
-  search alone and after the refinement.
 - ``cost``: the time of the derivatives of all channels by the geometry, over that of the channels
   and their responses, in the plane and in space.
 
@@ -70,8 +68,6 @@ SEEDS = 8
 """Number of searches of each straight or exact motion."""
 STRAIGHT_CHAINS = 4
 """Number of chains of the searches for a straight motion."""
-PATHS = ("line", "arc", "corner")
-PATH_SEEDS = 5
 SHARED = {"input_motion", "input_force", "strain"}
 """Channels that belong to a case, not to an output."""
 QUARTERS = [0.25, 0.5, 0.75, 1.0]
@@ -322,12 +318,6 @@ def runs() -> dict[str, Callable[[], dict[str, Any]]]:
                 kinds = {}
             for kind, (job, chains) in kinds.items():
                 out[f"{kind} {name} {seed}"] = partial(job, problem, spec, seed, chains)
-    for seed, name in product(range(PATH_SEEDS), PATHS):
-        task = find_task(name)
-        assert task is not None
-        out[f"path {name} {seed}"] = lambda task=task, seed=seed: from_search(
-            task.problem, task.part, seed
-        )
     return out
 
 
@@ -389,11 +379,10 @@ def specified_rows(rows: dict[str, dict[str, Any]]) -> list[str]:
     """Return a row for each specification.
 
     Runs that meet it by frames of 8 elements, and in the sheet; medians of the gain, of the largest
-    off-axis motion and rotation, and of the error of the path before and after the refinement, by
-    frames of 8 elements; the median time in s of one core.
+    off-axis motion and rotation, by frames of 8 elements; the median time in s of one core.
     """
     lines = []
-    kinds = {"straight", "straight-sheet", "exact", "path"}
+    kinds = {"straight", "straight-sheet", "exact"}
     names = {name.rpartition(" ")[0] for name in rows if name.split()[0] in kinds}
     for kind in sorted(names):
         own = [row for name, row in rows.items() if name.rpartition(" ")[0] == kind]
@@ -402,8 +391,7 @@ def specified_rows(rows: dict[str, dict[str, Any]]) -> list[str]:
             f"| {sum(bool(row.get('met_in_sheet')) for row in own)} of {len(own)} "
             f"| {_median(own, 'gain', '.3g')} | {_median(own, 'off_axis_frame', '.1%')} "
             f"| {_median(own, 'rotation_frame', '.2g')} "
-            f"| {_median(own, 'path_error_before', '.2%')} "
-            f"| {_median(own, 'path_error_frame', '.2%')} | {_median(own, 'seconds', '.0f')} s |"
+            f"| {_median(own, 'seconds', '.0f')} s |"
         )
     return lines
 
