@@ -234,7 +234,7 @@ def level_study(pool: ProcessPoolExecutor) -> None:
         f"{kind}:{name}"
         for name in builtin
         for kind in ("human", "machine")
-        if gallery_design(kind, name)  # type: ignore[arg-type]
+        if find_problem(name).lattice.dimension == 2 and gallery_design(kind, name)  # type: ignore[arg-type]
     ]
     columns = {
         "frame, linear": ("frame", FemSettings(linear=True)),
