@@ -288,7 +288,7 @@ def _finish(axes: Axes, chart: Chart) -> None:
 
 
 MANY = 1.0e5
-"""Number from which tick labels are powers of ten."""
+"""Number from which labels of powers of ten have an exponent."""
 
 
 def plain_number(value: float, _position: int = 0) -> str:
@@ -296,12 +296,13 @@ def plain_number(value: float, _position: int = 0) -> str:
 
     Examples
     --------
-    >>> plain_number(20000.0), plain_number(0.05), plain_number(1e6)
-    ('20\u202f000', '0.05', '10⁶')
+    >>> plain_number(20000.0), plain_number(0.05), plain_number(1e6), plain_number(2e5)
+    ('20\u202f000', '0.05', '10⁶', '200\u202f000')
     """
     size = abs(value)
-    if size >= MANY or 0.0 < size < 1e-3:
-        power = round(float(np.log10(size)))
+    power = round(float(np.log10(size))) if size else 0
+    has_exponent = size >= MANY or 0.0 < size < 1e-3
+    if has_exponent and np.isclose(size, 10.0**power):
         return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     return f"{value:,.0f}".replace(",", "\u202f") if size >= 1000 else f"{value:g}"
 

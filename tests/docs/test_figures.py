@@ -231,17 +231,16 @@ def costs() -> Rows:
         for each in read("surrogate/costs")["costs"]
         if each["device"] == "one core"
     }
-    fire, newton = cost["`fire` response", 1], cost["Newton response (default)", 1]
+    newton = cost["Newton response (default)", 1]
     batch = "torch bfloat16"
     for words, value in (
-        ("`fire` response (what the published code does)", fire),
         ("Newton response from rest (default)", newton),
         ("low-rank update, per flip", cost["low-rank update, per flip", 1]),
         ("`mlp`, batches of 256, bfloat16", cost[f"mlp, {batch}", 256]),
         ("`resnet18-w16`, batches of 256, bfloat16", cost[f"resnet18-w16, {batch}", 256]),
         ("`resnet50`, batches of 256, bfloat16", cost[f"resnet50, {batch}", 256]),
     ):
-        yield row(words, *map(three, (value, fire / value, newton / value)))
+        yield row(words, *map(three, (value, newton / value)))
 
 
 def shipped() -> Rows:

@@ -8,12 +8,16 @@ import shlex
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bellcrank.cli import main
 from bellcrank.cli.app import NOT_MET
 from bellcrank.model import human_design, read_design, write_design
 from bellcrank.part.units import GRAVITY
+from bellcrank.search.verification import ELEMENTS
+from bellcrank.workflows import find_design, spec_for
+from bellcrank.workflows.part_figures import part_figures
 from benchmarks.task_figures import carried, table
 from tools.draw_tasks import identity, recorded_runs
 
@@ -136,6 +140,25 @@ def test_the_part_on_the_front_of_the_readme_is_that_of_its_record() -> None:
     grams = [1000.0 * figures[name] / GRAVITY for name in ("payload_N", "dead_load_N")]
     assert f"sags by {figures['sag_mm']:.1f} mm" in text
     assert f"to {grams[0]:.0f} g, or {grams[1]:.0f} g hung on before the push" in text
+
+
+def test_the_bundled_crane_moves_as_the_readme_and_the_validation_say() -> None:
+    design = find_design("machine:crane")
+    (found,) = part_figures(design, spec_for(design), ELEMENTS)
+    left, down = -np.array(found["path_mm"][-1])
+    turn, payload, weight = (
+        found["rotation_deg"], found["payload_N"] / GRAVITY * 1e3,
+        found["dead_load_N"] / GRAVITY * 1e3,
+    )  # fmt: skip
+    readme = " ".join(README.read_text(encoding="utf-8").split())
+    assert f"moves its output {found['efficiency']:.1f} times as far as the input:" in readme
+    assert f"{left:.0f} mm to the left and also {down:.0f} mm down" in readme
+    assert f"turns it by {turn:.0f} degrees; a weight of {weight:.0f} g that hangs" in readme
+    page = (README.parent / "docs" / "validation.md").read_text(encoding="utf-8")
+    page = " ".join(page.split())
+    assert f"{left:.1f} mm to the left and {down:.1f} mm down, turns it by {turn:.1f}" in page
+    assert f"sags by {found['sag_mm']:.1f} mm" in page
+    assert f"grows with the input to {payload:.1f} g, or a weight of {weight:.1f} g" in page
 
 
 def test_every_command_is_known_with_all_its_options(
