@@ -3,8 +3,7 @@
 Each variant runs on the problems crane, anti-parallel and discs from the same seeds, with the same
 response (`unloaded_beams="prune_all"`). A design counts only if its equilibrium is stable when the
 load is applied in small increments. ``docs/moves.json`` contains the best efficiency and the
-processor time for each variant, problem and seed. The committed record also contains variants that
-were removed from the package, and the commit at which they can be run.
+processor time for each variant, problem and seed.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ import numpy as np
 
 from bellcrank.mechanics import VERIFICATION_INCREMENT, SpringEvaluator, Status
 from bellcrank.model import find_problem
+from bellcrank.provenance import provenance
 from bellcrank.search import advance_chain, make_evaluator, read_settings, start_chain
 
 RECORD = Path(__file__).parents[1] / "docs" / "moves.json"
@@ -55,11 +55,12 @@ def run(name: str, problem_name: str, seed: int) -> tuple[float, float]:
 def main() -> None:
     """Run all variants and write the record after each seed."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=8, help="number of seeds")
+    parser.add_argument("--seeds", type=int, default=4, help="number of seeds")
     parser.add_argument("--out", type=Path, default=RECORD, help="JSON file")
     options = parser.parse_args()
     record = {
         "command": "python -m benchmarks.move_comparison",
+        "provenance": provenance(),
         "unloaded_beams": "prune_all",
         "variants": VARIANTS,
         "results": {name: {problem: [] for problem in PROBLEMS} for name in VARIANTS},
