@@ -96,12 +96,9 @@ def draw(figures: Mapping[str, Any], path: Path) -> None:
 
 
 def _training_chart(figures: Mapping[str, Any]) -> Chart:
-    series = []
-    rows = [(figures["network"], figures["epochs"], style.BEST)]
-    for name, epochs, colour in rows:
-        samples = np.array([each["designs"] for each in epochs], dtype=float)
-        accuracy = np.array([each["r_squared"] or np.nan for each in epochs], dtype=float)
-        series.append(Series(samples, accuracy, name=name, kind="both", colour=colour))
+    samples = np.array([each["designs"] for each in figures["epochs"]], dtype=float)
+    accuracy = np.array([each["r_squared"] or np.nan for each in figures["epochs"]], dtype=float)
+    series = [Series(samples, accuracy, name=figures["network"], kind="both", colour=style.BEST)]
     level = Level(published.R_SQUARED, f"the paper, {published.R_SQUARED}")
     return Chart(
         "Accuracy during training", "training samples", "R² on held-out runs", series, [level],
