@@ -1,19 +1,15 @@
-"""Accuracy of a network on designs of an independent simulation.
+"""Designs of an independent simulation: ``python -m benchmarks.independent_simulation FILE``.
 
-``python -m benchmarks.independent_simulation`` runs searches with a second implementation of the
-spring model and of the paper's chain, and compares the predictions of a network with the
-efficiencies of all proposed designs. The implementation in this module uses the arrays of the
-problem, and no other code of bellcrank: it has its own energy, equilibrium, chain and random
-numbers. Newton steps with dense matrices evaluate about 25 designs per second. Half of the runs
-search for the most negative efficiency. The accuracy is written to
-``docs/surrogate/independent-simulation.json``. With ``--dataset FILE`` the designs are written, so
-that other networks can be tested on them (``python -m benchmarks.surrogate_long_runs``).
+Searches run with a second implementation of the spring model and of the paper's chain, which uses
+the arrays of the problem and no other code of bellcrank: it has its own energy, equilibrium, chain
+and random numbers. Newton steps with dense matrices evaluate about 25 designs per second. Half of
+the runs search for the most negative efficiency. The proposed designs and their efficiencies are
+written to a Parquet file; ``python -m benchmarks.surrogate_long_runs`` compares networks with them.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,18 +20,13 @@ from scipy.sparse import bsr_array, coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from bellcrank.model import find_problem
-from bellcrank.model.storage import write_text
-from bellcrank.provenance import provenance
 from bellcrank.surrogate.dataset import Dataset
-from bellcrank.surrogate.metrics import accuracy
-from bellcrank.surrogate.predictor import load_predictor
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
 
-RECORD = Path(__file__).parents[1] / "docs" / "surrogate" / "independent-simulation.json"
 INCREMENTS = (0.5, 1.0)
 """Fractions of the stroke at which the equilibrium is computed."""
 FORCE_TOLERANCE = 1e-9
@@ -191,24 +182,23 @@ def _block_diagonal(blocks: NDArray[np.float64]) -> csr_array:
 def search(
     simulation: Simulation,
     problem: Problem,
-    options: argparse.Namespace,
+    steps: int,
     run: int,
     rng: np.random.Generator,
 ) -> tuple[list[NDArray[np.bool_]], list[float]]:
-    """Run the paper's search once; return masks and efficiencies of every n-th proposed design."""
+    """Run the paper's search once; return masks and efficiencies of the proposed designs."""
     sign = 1 - 2 * (run % 2)
     mask = np.asarray(problem.initial).copy()
     cost = math.exp(-sign * simulation.efficiency(mask))
     masks, efficiencies, accepted = [], [], 0
-    for step in range(options.steps):
+    for _ in range(steps):
         proposed = mask.copy()
         proposed[rng.choice(problem.designable)] ^= True
         efficiency = simulation.efficiency(proposed)
         if math.isnan(efficiency):
             continue
-        if step % options.every == 0:
-            masks.append(proposed)
-            efficiencies.append(efficiency)
+        masks.append(proposed)
+        efficiencies.append(efficiency)
         increase = math.exp(-sign * efficiency) - cost
         temperature = max(0.06 - (0.06 - 1e-3) * accepted / 100, 1e-3)
         if increase <= 0 or rng.random() < math.exp(-increase / temperature):
@@ -217,17 +207,16 @@ def search(
 
 
 def main() -> None:
-    """Run the searches, print the accuracy and write the record."""
+    """Run the searches and write the proposed designs."""
     options = parse()
     problem = find_problem("crane")
-    predictor = load_predictor(problem, options.model)
     simulation = Simulation(problem)
     rng = np.random.Generator(np.random.MT19937(options.seed))
     masks: list[NDArray[np.bool_]] = []
     efficiencies: list[float] = []
     runs: list[int] = []
     for run in range(options.runs):
-        new_masks, values = search(simulation, problem, options, run, rng)
+        new_masks, values = search(simulation, problem, options.steps, run, rng)
         masks += new_masks
         efficiencies += values
         runs += [run] * len(values)
@@ -235,31 +224,19 @@ def main() -> None:
             f"run {run + 1} of {options.runs}: efficiency of the last design {values[-1]:.3f}",
             flush=True,
         )
-    if options.dataset:
-        packed = np.packbits(np.array(masks), axis=1)
-        Dataset(problem, packed, np.array(efficiencies), np.array(runs)).write(
-            options.dataset, overwrite=True
-        )
-    predicted = predictor.predict(np.array(masks))
-    result = accuracy(predicted, np.array(efficiencies)).to_dict()
-    settings = {name: getattr(options, name) for name in ("runs", "steps", "every", "seed")}
-    print(f"R2 {result['r_squared']:.4f}, determination {result['determination']:.4f}, "
-          f"{result['count']} designs")  # fmt: skip
-    record = {"provenance": provenance(), **settings, **result}
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    write_text(options.out, json.dumps(record, indent=1) + "\n", overwrite=True)
+    packed = np.packbits(np.array(masks), axis=1)
+    Dataset(problem, packed, np.array(efficiencies), np.array(runs)).write(
+        options.file, overwrite=True
+    )
 
 
 def parse() -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("file", type=Path, help="Parquet file for the designs")
     parser.add_argument("--runs", type=int, default=12, help="number of runs")
     parser.add_argument("--steps", type=int, default=582, help="steps of each run")
     parser.add_argument("--seed", type=int, default=0, help="seed of the random numbers")
-    parser.add_argument("--every", type=int, default=1, help="test every n-th proposal")
-    parser.add_argument("--model", type=Path, help="file of a trained network [the bundled one]")
-    parser.add_argument("--dataset", type=Path, help="Parquet file for the designs")
-    parser.add_argument("--out", type=Path, default=RECORD, help="JSON file")
     return parser.parse_args()
 
 

@@ -69,16 +69,11 @@ def test_a_row_replaces_that_of_the_same_network_and_set_only(
 def test_the_independent_program_agrees_with_the_mechanics_and_writes_its_designs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    crane = find_problem("crane")
-    untrained(crane).write(tmp_path / "a.safetensors")
-    words = ["", "--runs", "2", "--steps", "9", "--every", "4", "--out", str(tmp_path / "r.json")]
-    words += ["--model", str(tmp_path / "a.safetensors"), "--dataset", str(tmp_path / "d.parquet")]
+    words = ["", str(tmp_path / "d.parquet"), "--runs", "2", "--steps", "3"]
     monkeypatch.setattr(sys, "argv", words)
     independent_simulation.main()
-    record = json.loads((tmp_path / "r.json").read_text())
-    data = read_dataset(tmp_path / "d.parquet")
-    assert record["count"] == len(data) == 6
-    assert (record["every"], data.run.tolist()) == (4, [0, 0, 0, 1, 1, 1])
+    crane, data = find_problem("crane"), read_dataset(tmp_path / "d.parquet")
+    assert data.run.tolist() == [0, 0, 0, 1, 1, 1]
     evaluator = SpringEvaluator(crane)
     masks = np.unpackbits(data.packed, axis=1, count=crane.lattice.beam_count).astype(bool)
     expected = [evaluator.evaluate(mask).efficiency for mask in masks]
