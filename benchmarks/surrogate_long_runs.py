@@ -6,8 +6,8 @@
 The runs are in none of the trainings: their seeds are their own. Half of the runs of each set
 search for the most negative efficiency. Consecutive proposals of a run are similar, so that each
 set is a sample of its runs (`every`). ``--set NAME=FILE`` tests on a dataset in place of these
-runs, such as that of ``python -m benchmarks.independent_simulation FILE``. The accuracies
-are written to ``docs/surrogate/long-runs.json``; a row of the same network and set is replaced.
+runs, such as that of ``python -m benchmarks.independent_simulation FILE``. The accuracies are
+written to ``docs/surrogate/long-runs.json``; a row of the same network and set is replaced.
 
 The bias is the mean of predicted - actual efficiency over the designs whose actual efficiency is
 beyond `BOUND` on one side.

@@ -69,11 +69,11 @@ def test_a_row_replaces_that_of_the_same_network_and_set_only(
 def test_the_independent_program_agrees_with_the_mechanics_and_writes_its_designs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = ["", str(tmp_path / "d.parquet"), "--runs", "2", "--steps", "3"]
+    words = ["", str(tmp_path / "d.parquet"), "--runs", "2", "--steps", "9"]
     monkeypatch.setattr(sys, "argv", words)
     independent_simulation.main()
     crane, data = find_problem("crane"), read_dataset(tmp_path / "d.parquet")
-    assert data.run.tolist() == [0, 0, 0, 1, 1, 1]
+    assert data.run.tolist() == 9 * [0] + 9 * [1]
     evaluator = SpringEvaluator(crane)
     masks = np.unpackbits(data.packed, axis=1, count=crane.lattice.beam_count).astype(bool)
     expected = [evaluator.evaluate(mask).efficiency for mask in masks]
