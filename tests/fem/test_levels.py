@@ -54,6 +54,24 @@ def test_a_stretched_bar_has_nearly_the_same_figures_as_a_continuum(level: str) 
     assert last.energy == pytest.approx(0.5 * last.force[0] * 0.5, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("level", "tolerance"), [("frame", 1e-9), ("plane", 0.03), ("solid", 0.03)]
+)
+def test_a_node_of_a_bent_bar_turns_and_leaves_its_direction(level: str, tolerance: float) -> None:
+    if level != "frame":
+        pytest.importorskip("ngsolve", reason="NGSolve is not installed")
+    part = bar(0.1, (0.6, 0.8))
+    last = levels[level](part, FemSettings(linear=True, size=1.0)).last
+    # Half way up a cantilever with a tip motion d, the deflection is 5 d / 16, the slope 9 d / 8 L;
+    # half of the motion along the bar arrives there.
+    assert last.off_axis == pytest.approx(0.08 * 5.0 / 16.0 / (0.06 / 2.0), rel=2.0 * tolerance)
+    slope = math.degrees(9.0 * 0.08 / (8.0 * 20.0))
+    assert last.rotation == pytest.approx(slope, rel=2.0 * tolerance)
+    data = last.to_dict()
+    assert data["off_axis"] == last.off_axis
+    assert data["output_rotation_deg"] == last.rotation
+
+
 def test_a_bent_bar_is_stressed_most_where_it_is_clamped() -> None:
     part = bar(0.1, (0.0, 1.0))
     last = levels["frame"](part, FemSettings(linear=True)).last

@@ -98,6 +98,13 @@ def test_a_solid_moves_as_a_frame_of_eight_elements() -> None:
     moved = expected.displacement[3] * spec.scale
     assert np.array(analysis.last.output) == pytest.approx(moved, abs=0.04 * np.linalg.norm(moved))
     assert analysis.last.energy == pytest.approx(expected.energy * spec.scale**3, rel=0.04)
+    turned = frame.output_motion()
+    assert analysis.last.off_axis == pytest.approx(turned.off_axis, rel=0.04)
+    # The hub at the end of the strut turns by a little less than its axis.
+    assert analysis.last.rotation == pytest.approx(np.linalg.norm(turned.rotation), rel=0.05)
+    beams = levels["frame"](spec.of(design), FemSettings(elements=8)).last
+    assert beams.off_axis == pytest.approx(turned.off_axis, rel=1e-6)
+    assert beams.rotation == pytest.approx(np.linalg.norm(turned.rotation), rel=1e-6)
     assert len(analysis.last.force) == 3
     assert not len(analysis.contacts.pairs)
     assert validation.doubts == []

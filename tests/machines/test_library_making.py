@@ -10,7 +10,7 @@ import threading
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -24,34 +24,48 @@ from bellcrank.model import Section
 from bellcrank.refine import RefinementSettings
 from bellcrank.storage.locking import LOCK, locked
 from bellcrank.workflows.library_making import SEARCHES, make
+from bellcrank.workflows.refinement import refine_selection
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bellcrank.search import Progress
+    from bellcrank.part import PartSpec
+    from bellcrank.search import Progress, Selection
 
 KINDS = ("straight-10g", "straight-50g")
 SETTINGS = MakeSettings(directions=("up",), columns=(5,), kinds=KINDS, steps=300, chains=2)
-SHORT = RefinementSettings(evaluations=30)
+FIRST = RefinementSettings(evaluations=10)
+FURTHER = RefinementSettings(evaluations=30)
 ROOT = Path(__file__).parents[2]
 TIMED = ("provenance", "checksum")
 SCRIPT = """
 import sys
 from pathlib import Path
-from tests.machines.test_library_making import SETTINGS, SHORT
-from bellcrank.workflows import refiners
+import pytest
+from tests.machines.test_library_making import SETTINGS, shorten
 from bellcrank.workflows.library_making import make
-refiners.SETTINGS = SHORT
+shorten(pytest.MonkeyPatch())
 for made in make(SETTINGS, Path(sys.argv[1]), workers=1):
     pass
 """
 
 
+def shorten(patch: pytest.MonkeyPatch) -> None:
+    """Refine in a few steps, without the sheet."""
+
+    def refine(selection: Selection, _part: PartSpec, **options: Any) -> Any:
+        return refine_selection(selection, None, **options)
+
+    patch.setattr("bellcrank.workflows.refinement.FIRST", FIRST)
+    patch.setattr("bellcrank.workflows.refiners.SETTINGS", FURTHER)
+    patch.setattr("bellcrank.workflows.library_making.refine_selection", refine)
+
+
 @pytest.fixture(scope="module", autouse=True)
 def short_refinement() -> Iterator[None]:
-    """Refine in a few steps."""
+    """Refine in a few steps, without the sheet."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("bellcrank.workflows.refiners.SETTINGS", SHORT)
+        shorten(patch)
         yield
 
 
@@ -76,7 +90,10 @@ def told(folder: Path) -> dict[str, object]:
 
 
 @pytest.mark.slow
-def test_entries_are_refined(tmp_path: Path) -> None:
+def test_entries_are_refined(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("ngsolve", reason="NGSolve is not installed")
+    # With the sheet.
+    monkeypatch.setattr("bellcrank.workflows.library_making.refine_selection", refine_selection)
     settings = MakeSettings(
         directions=("left",), columns=(7,), kinds=("straight-10g",), steps=2000, chains=1
     )
@@ -89,6 +106,7 @@ def test_entries_are_refined(tmp_path: Path) -> None:
     assert first["reached"]["frames, 8 elements"]["value"] == pytest.approx(
         entry.figures["efficiency"], rel=1e-6
     )
+    assert all(item["reached"]["sheet"]["met"] for item in entry.provenance["items"])
     assert not entry.design.problem.is_specified
     task = EntryTask("left", 7, "straight-10g").problem()
     moved = entry.design.problem.lattice.positions - task.lattice.positions

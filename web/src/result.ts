@@ -28,7 +28,7 @@ export interface Subject {
   place: [string, string] | null;
 }
 
-interface Fem { level: string; status: string; efficiency: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null; items: ItemState[] | null; figures: PartFigures[] | null }
+interface Fem { level: string; status: string; efficiency: number | null; off_axis: number | null; output_rotation_deg: number | null; von_mises_MPa: number | null; principal_strain: number | null; input_push_N: number | null; warnings: string[]; doubts: string[]; picture: Picture | null; items: ItemState[] | null; figures: PartFigures[] | null }
 interface Remarks { size: [number, number, number]; /** Box that holds the part along the stroke, mm. */ swept: number[]; volume: number; mass: number | null; stroke: number | null; remarks: string[]; touching: number[]; /** Centres of screw holes, mm. */ screws: Point[]; /** Loops of the outline with plate and pads, mm; the last are the screw holes. */ outline: Point[][] }
 interface Print { minutes: number | null; layers: number; layer_mm: number; mass: number | null; slicer: string; profile: string }
 
@@ -285,9 +285,14 @@ export class Result {
     }
     if (known === "running") return h("tr", {}, heading, h("td", { colspan: 2, class: "more" }, h("span", { class: "working" }), `computing${this.shareText(name)}`));
     if (typeof known === "string") return h("tr", {}, heading, h("td", { colspan: 2, class: "fault" }, known));
-    const stress = known.von_mises_MPa === null ? "" : `${figure(known.von_mises_MPa, 2)} MPa, ${figure(100 * (known.principal_strain ?? 0), 0)} % strain`;
+    const figures = [
+      known.off_axis === null ? "" : `${figure(100 * known.off_axis, 0)} % off-axis`,
+      known.output_rotation_deg === null ? "" : `${figure(known.output_rotation_deg, 1)}° rotation`,
+      known.von_mises_MPa === null ? "" : `${figure(known.von_mises_MPa, 2)} MPa`,
+      known.principal_strain === null ? "" : `${figure(100 * known.principal_strain, 0)} % strain`,
+    ].filter(Boolean).join(", ");
     // Warnings of the frame are shown below the headline.
-    const details = known.efficiency === null ? sentence(known.status) : stress;
+    const details = known.efficiency === null ? sentence(known.status) : figures;
     const text = [details, ...(name === "frame" ? [] : known.warnings.map(sentence))].filter(Boolean).join(" ");
     return h("tr", {}, heading, h("td", {}, figure(known.efficiency, 3)), h("td", { class: "more" }, text,
       known.picture && h("span", {}, " ", button("Show stress", () => this.player.showStress(known.picture), "quiet small"))));

@@ -283,23 +283,39 @@ def _saver(path: Path | None, *, required: bool) -> Callable[[Validation], None]
 
 def _print(validation: Validation) -> None:
     """Print the figures of each level in a table, one column for each."""
+    import numpy as np
+
+    from bellcrank.fem.results import finite
     from bellcrank.mechanics import objective_name
-    from bellcrank.workflows.figures import model_words
+    from bellcrank.mechanics.output import output_motion
+    from bellcrank.workflows.figures import figure_text, model_words
     from bellcrank.workflows.report_tables import figure_table_by_model
     from bellcrank.workflows.specification import item_rows
 
+    problem = validation.design.problem
     table = Table(box=SIMPLE)
     table.add_column("")
-    table.add_column(model_words(validation.design.problem), justify="right")
+    table.add_column(model_words(problem), justify="right")
     columns = [_column(analysis) for analysis in validation.analyses]
     for analysis in validation.analyses:
         table.add_column(_heading(analysis), justify="right")
     response = validation.response
-    first = [f"{response.efficiency:.4f}", "", "", "", "", response.status.label]
-    objective = objective_name(validation.design.problem)
+    moved = output_motion(problem, response.displacement)
+    first = [
+        f"{response.efficiency:.4f}",
+        "",
+        figure_text(finite(moved.off_axis), "{:.1%}"),
+        figure_text(finite(float(np.linalg.norm(moved.rotation))), "{:.2g} deg"),
+        "",
+        "",
+        "",
+        response.status.label,
+    ]
     names = (
-        f"efficiency ({objective})",
+        f"efficiency ({objective_name(problem)})",
         "output, mm",
+        "off-axis motion",
+        "rotation",
         "force, N",
         "stress, MPa",
         "strain",
@@ -309,7 +325,7 @@ def _print(validation: Validation) -> None:
         table.add_row(name, first[row], *(column[row] for column in columns))
     results.print(table)
     if validation.items:
-        rows = item_rows(validation.design.problem, validation.spec, validation.items)
+        rows = item_rows(problem, validation.spec, validation.items)
         results.print(text_grid(rows))
         results.print(text_grid(figure_table_by_model(validation.figures)))
     for doubt in validation.doubts:
@@ -327,12 +343,17 @@ def _heading(analysis: Analysis) -> str:
 
 def _column(analysis: Analysis) -> list[str]:
     """Return the figures of an analysis as text."""
+    from bellcrank.fem.results import finite
+    from bellcrank.workflows.figures import figure_text
+
     point = analysis.last
     known = math.isfinite(analysis.efficiency)
     status = analysis.status.value
     return [
         f"{analysis.efficiency:.4f}" if known else "-",
         ", ".join(f"{value:.3f}" for value in point.output),
+        figure_text(finite(point.off_axis), "{:.1%}"),
+        f"{point.rotation:.2g} deg",
         f"{point.push:.3f}",
         f"{point.stress:.3f}",
         f"{point.strain:.1%}",

@@ -7,12 +7,14 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bellcrank.fem.path import PathStatus
 from bellcrank.mechanics import efficiency_of
+from bellcrank.mechanics.output import output_motion
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from bellcrank.fem.contact import Contacts
     from bellcrank.fem.path import StabilityLoss
@@ -31,6 +33,10 @@ class StrokePoint:
         Efficiency by the problem's objective.
     output : (d,)
         Mean displacement of the output nodes, mm.
+    off_axis
+        Off-axis motion of the output as a part of its motion; nan without motion.
+    rotation
+        Size of the rotation of the output, degrees.
     force : (d,)
         Total force on the input nodes, N.
     push
@@ -47,6 +53,8 @@ class StrokePoint:
     load: float
     efficiency: float
     output: tuple[float, ...]
+    off_axis: float
+    rotation: float
     force: tuple[float, ...]
     push: float
     energy: float
@@ -59,6 +67,8 @@ class StrokePoint:
             "load": self.load,
             "efficiency": finite(self.efficiency),
             "mean_output_displacement_mm": [finite(value) for value in self.output],
+            "off_axis": finite(self.off_axis),
+            "output_rotation_deg": finite(self.rotation),
             "input_force_N": [finite(value) for value in self.force],
             "input_push_N": finite(self.push),
             "energy_N_mm": finite(self.energy),
@@ -72,6 +82,7 @@ def stroke_point(
     load: float,
     motion: NDArray[np.float64],
     forces: NDArray[np.float64],
+    rotation: ArrayLike,
     **figures: float,
 ) -> StrokePoint:
     """Return the figures of an equilibrium.
@@ -86,6 +97,8 @@ def stroke_point(
         Displacements of the lattice nodes, mm; 0 for nodes without struts.
     forces : (i, d) float64
         Forces on the input nodes, N.
+    rotation : () or (3,)
+        Rotation of the output: angle in the plane, rotation vector in space, degrees.
     **figures
         Energy, stress and strain.
     """
@@ -95,6 +108,8 @@ def stroke_point(
         load=load,
         efficiency=efficiency_of(problem, motion / part.scale, load=load),
         output=tuple(output.tolist()),
+        off_axis=output_motion(problem, motion).off_axis,
+        rotation=float(np.linalg.norm(rotation)),
         force=tuple(force.tolist()),
         push=float((forces * problem.input.direction).sum()),
         **figures,

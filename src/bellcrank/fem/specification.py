@@ -13,7 +13,7 @@ from bellcrank.fem.continuum.analysis import contacts_along
 from bellcrank.fem.continuum.equations import ContinuumEquations
 from bellcrank.fem.continuum.fields import stress_field
 from bellcrank.fem.continuum.mesh import COARSE, FINE, plane_mesh
-from bellcrank.fem.continuum.response import complete_state, hub_displacements
+from bellcrank.fem.continuum.response import complete_state, hub_displacements, output_rotation
 from bellcrank.fem.continuum.space_mesh import space_mesh
 from bellcrank.fem.continuum.system import continuum_system
 from bellcrank.fem.path import PathState, PathStatus, StepControl, follow_path
@@ -24,7 +24,7 @@ from bellcrank.mechanics.frames.output_loads import (
     with_output,
     with_payload,
 )
-from bellcrank.mechanics.output import best_fit_rotation, motion_weights
+from bellcrank.mechanics.output import motion_weights
 from bellcrank.mechanics.splines import stroke_spline
 from bellcrank.mechanics.stroke_record import forces_of
 from bellcrank.search.strut_loss import StrutLosses
@@ -280,22 +280,13 @@ class _Sheet:
         return np.asarray((main.motion[:, given.nodes] * given.direction).sum(axis=2).mean(axis=1))
 
     def _rotation(self, main: SheetPath, problem: Problem) -> Values:
-        """Return (S,) the rotation of the output, of its nodes or of a single hub; degrees.
-
-        In space its size.
-        """
-        nodes, rest = problem.output.nodes, problem.lattice.positions
-        if len(nodes) > 1:
-            turns = [best_fit_rotation(rest[nodes], moved[nodes]) for moved in main.motion]
-            return _angles(turns)
-        inside = self.mesh.elements[self.mesh.hub_of_element == nodes[0]]
-        corners = np.unique(inside)
-        return _angles(
-            [
-                best_fit_rotation(field.rest[corners], field.displacement[corners])
-                for field in main.fields
-            ]
-        )
+        """Return (S,) the rotation of the output, degrees; in space its size."""
+        turns = [
+            output_rotation(problem, self.mesh, motion, field)
+            for motion, field in zip(main.motion, main.fields, strict=True)
+        ]
+        found = np.array(turns, dtype=np.float64)
+        return found if found.ndim == 1 else np.asarray(np.linalg.norm(found, axis=1))
 
     def _stiffness(self, main: SheetPath, problem: Problem) -> Values:
         """Return (1,) the stiffness of the output at full stroke, lattice units."""
@@ -377,9 +368,3 @@ def _rounded(values: Values) -> Values:
     if largest == 0.0:
         return values
     return np.round(values, DIGITS - math.ceil(math.log10(largest)))
-
-
-def _angles(rotations: Sequence[Values]) -> Values:
-    """Return (S,) rotations in the plane, and the sizes of rotation vectors in space, degrees."""
-    found = np.array(rotations, dtype=np.float64)
-    return found if found.ndim == 1 else np.asarray(np.linalg.norm(found, axis=1))

@@ -335,6 +335,7 @@ def validation(
     keys = (
         "level", "theory", "status", "stable", "reached", "efficiency", "von_mises_MPa",
         "principal_strain", "input_force_N", "input_push_N", "mean_output_displacement_mm",
+        "off_axis", "output_rotation_deg",
         "warnings", "discrete_model",
     )  # fmt: skip
     results = validation.items.get(BODIES.get(level, ""))

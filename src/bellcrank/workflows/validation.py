@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 SCHEMA = "bellcrank/validation/1"
 TOP = (
     "level", "theory", "linear", "status", "reached", "efficiency",
-    "mean_output_displacement_mm", "input_force_N", "input_push_N", "energy_N_mm",
-    "von_mises_MPa", "principal_strain",
+    "mean_output_displacement_mm", "off_axis", "output_rotation_deg", "input_force_N",
+    "input_push_N", "energy_N_mm", "von_mises_MPa", "principal_strain",
 )  # fmt: skip
 """Figures of the first analysis that are repeated at the top of the JSON result."""
 

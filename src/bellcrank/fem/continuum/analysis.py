@@ -133,6 +133,7 @@ def _point_of(part: Part, state: ContinuumState) -> StrokePoint:
         state.load,
         state.motion[:, axes],
         state.force[problem.input.nodes, axes],
+        state.rotation,
         energy=state.energy,
         stress=state.stress,
         strain=state.strain,

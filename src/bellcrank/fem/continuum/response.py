@@ -15,6 +15,7 @@ from bellcrank.fem.continuum.solid import solid_mesh
 from bellcrank.fem.continuum.space_mesh import space_mesh
 from bellcrank.fem.continuum.system import MEAN_ORDER, continuum_system, integration
 from bellcrank.fem.path import EquilibriumPath, PathState, PathStatus, StepControl, follow_path
+from bellcrank.mechanics.output import best_fit_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from bellcrank.fem.continuum.mesh import ContinuumMesh
     from bellcrank.fem.results import Field
+    from bellcrank.model import Problem
     from bellcrank.part.part import Part
 
 STEPS = StepControl(first=0.125, largest=0.25)
@@ -38,6 +40,8 @@ class ContinuumState:
         Fraction of the full input, 0 to 1.
     motion : (N, 2) or (N, 3) float64
         Mean displacements of the hubs of the lattice nodes, mm; 0 for nodes without a hub.
+    rotation : () or (3,) float64
+        Rotation of the output, degrees.
     force : (N, 2) or (N, 3) float64
         External forces on the hubs, N, from supports, input and springs.
     input_force
@@ -52,6 +56,7 @@ class ContinuumState:
 
     load: float
     motion: NDArray[np.float64]
+    rotation: NDArray[np.float64]
     force: NDArray[np.float64]
     input_force: float
     energy: float
@@ -166,7 +171,8 @@ def complete_state(
     part: Part, equations: ContinuumEquations, state: PathState, stress: StressField
 ) -> ContinuumState:
     """Return an equilibrium with displacements and forces at the lattice nodes."""
-    system, given = equations.system, part.design.problem.input
+    system, problem = equations.system, part.design.problem
+    given = problem.input
     force = _hub_forces(equations, state)
     motion = hub_displacements(equations, state)
     mesh = system.mesh
@@ -176,12 +182,41 @@ def complete_state(
     return ContinuumState(
         load=state.load,
         motion=motion,
+        rotation=output_rotation(problem, mesh, motion / part.scale, stress.field),
         force=force,
         input_force=float((force[given.nodes, : given.direction.shape[1]] * given.direction).sum()),
         energy=float(energy),
         stress=stress.largest_stress,
         strain=stress.largest_strain,
     )
+
+
+def output_rotation(
+    problem: Problem, mesh: ContinuumMesh, motion: NDArray[np.float64], field: Field
+) -> NDArray[np.float64]:
+    """Return the rotation of the output, of its nodes or of a single hub, degrees.
+
+    Parameters
+    ----------
+    problem
+        Problem of the part.
+    mesh
+        Mesh of the part.
+    motion : (N, d) float64
+        Mean displacements of hubs, lattice units.
+    field
+        Displacement of the vertices of the mesh.
+
+    Returns
+    -------
+    () or (3,) float64
+        Angle in the plane; rotation vector in space, and of a single hub of a solid.
+    """
+    nodes, rest = problem.output.nodes, problem.lattice.positions
+    if len(nodes) > 1:
+        return best_fit_rotation(rest[nodes], motion[nodes, : rest.shape[1]])
+    corners = np.unique(mesh.elements[mesh.hub_of_element == nodes[0]])
+    return best_fit_rotation(field.rest[corners], field.displacement[corners])
 
 
 def hub_displacements(equations: ContinuumEquations, state: PathState) -> NDArray[np.float64]:

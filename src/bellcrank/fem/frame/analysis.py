@@ -16,6 +16,7 @@ from bellcrank.fem.path import PathStatus, follow_path
 from bellcrank.fem.results import Analysis, Field, StrokePoint, stroke_point
 from bellcrank.mechanics.frames.analysis import without_ends
 from bellcrank.mechanics.frames.beams import theories
+from bellcrank.mechanics.output import best_fit_rotation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -94,13 +95,18 @@ levels.register("frame")(Level(analyse_frame, check_frame, title="Frame", durati
 def point_of(part: Part, frame: PartFrame, state: FrameState) -> StrokePoint:
     """Return the figures of an equilibrium."""
     stress, strain = fibre_stress_and_strain(part, frame, state)
-    nodes = part.design.problem.input.nodes
+    problem = part.design.problem
     force = state.reaction + state.load * frame.load
+    motion, output = state.displacement[: len(part.positions)], problem.output.nodes
+    rotation = best_fit_rotation(part.positions[output], motion[output, :2])
+    if len(output) == 1:
+        rotation = np.degrees(motion[output[0], 2])
     return stroke_point(
         part,
         state.load,
-        state.displacement[: len(part.positions), :2],
-        force[nodes, :2],
+        motion[:, :2],
+        force[problem.input.nodes, :2],
+        rotation,
         energy=energy(frame, state),
         stress=float(stress.max()),
         strain=float(strain.max()),

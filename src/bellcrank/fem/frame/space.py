@@ -125,7 +125,7 @@ class _States:
         """Return the figures at rest."""
         motion = np.zeros_like(self.problem.lattice.positions)
         forces = np.zeros_like(self.problem.input.direction)
-        return stroke_point(self.part, 0.0, motion, forces, energy=0.0, stress=0.0, strain=0.0)
+        return stroke_point(self.part, 0.0, motion, forces, 0.0, energy=0.0, stress=0.0, strain=0.0)
 
     def point(self, state: Equilibrium) -> StrokePoint:
         """Return the figures of an equilibrium."""
@@ -136,6 +136,7 @@ class _States:
             state.fraction,
             self.part.scale * state.state.u[:nodes, :3],
             self.force * strain.input_forces,
+            quantities["rotation"].value(state),
             energy=self.force * self.part.scale * float(strain.energy.sum()),
             stress=float(self._stress(state).max()),
             strain=quantities["strain"].value(state),
