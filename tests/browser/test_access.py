@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .conftest import Server
 
 pytestmark = pytest.mark.slow
+WIDTHS = (1440, 390, 320)
 
 
 def findings(page: Any) -> list[str]:
@@ -26,8 +27,16 @@ def findings(page: Any) -> list[str]:
     ]
 
 
+def check_widths(page: Any) -> None:
+    """Check the page in windows of all widths: no serious findings, no sideways scroll."""
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 900})
+        assert findings(page) == [], width
+        assert page.evaluate("document.documentElement.scrollWidth") <= width, width
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [1440, 390, 320])
+@pytest.mark.parametrize("width", WIDTHS)
 def test_axe_finds_nothing_serious(page: Any, server: Server, scheme: str, width: int) -> None:
     page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
     page.set_viewport_size({"width": width, "height": 900})
@@ -57,22 +66,19 @@ def test_axe_finds_nothing_serious(page: Any, server: Server, scheme: str, width
         assert page.evaluate("document.documentElement.scrollWidth") <= width, place
 
 
-@pytest.mark.parametrize("width", [1440, 320])
-def test_axe_finds_nothing_serious_in_a_search_and_its_result(page: Any, width: int) -> None:
+def test_axe_finds_nothing_serious_in_a_search_and_its_result(page: Any) -> None:
     page.emulate_media(reduced_motion="reduce")
-    page.set_viewport_size({"width": width, "height": 900})
     start_search(page, "Thorough")
     page.get_by_text("steps/s").wait_for()
     page.locator(".readout strong").wait_for()
-    assert findings(page) == []
+    check_widths(page)
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("button", name="Choose the best").click()
     page.locator('.player[data-ready="yes"]').wait_for()
     page.locator(".colour label", has_text="Stress").click()
     page.locator(".figures td", has_text="MPa").first.wait_for()
     page.locator(".figures.part").wait_for()
-    assert findings(page) == []
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    check_widths(page)
 
 
 def test_a_task_can_be_defined_with_the_keyboard_alone(page: Any) -> None:
