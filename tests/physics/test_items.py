@@ -12,13 +12,14 @@ from bellcrank.mechanics import (
     Channel,
     StrokeRecord,
     item_results,
+    objective_value,
     quantity_values,
     reduced,
     tightened,
     violation,
 )
-from bellcrank.mechanics.items import Bounds, path_deviation, path_error
-from bellcrank.model import Item
+from bellcrank.mechanics.items import MOST_LOADS, Bounds, path_deviation, path_error
+from bellcrank.model import Item, ObjectiveTerm
 
 FRACTIONS = np.array([0.25, 0.5, 0.75, 1.0])
 ALONG = np.array([0.1, 0.3, 0.6, 1.0])
@@ -149,3 +150,31 @@ def test_a_right_angle_that_is_cut_has_a_large_error() -> None:
 def test_a_reserve_tightens_bounds(wanted: Item, bounds: tuple[float, float]) -> None:
     tight = tightened(wanted, 0.05)
     assert (tight.at_least, tight.at_most) == pytest.approx(bounds)
+
+
+@pytest.mark.parametrize(
+    ("free", "loaded", "expected"),
+    [
+        (1.0, 0.8, 0.1),  # a fifth of the motion is lost to 0.04
+        (1.0, 1.1, 0.04 * MOST_LOADS),  # the load increases the motion
+        (-1.0, -1.2, 0.0),  # the output moves against its direction, and further by the load
+        (-1.0, -0.8, 0.0),
+        (0.0, -0.1, 0.0),
+    ],
+)
+def test_a_payload_as_an_objective_is_finite(free: float, loaded: float, expected: float) -> None:
+    channels = {
+        Channel("motion", "tip"): np.array([[free, 0.0, 0.0]]),
+        Channel("loaded_motion", "tip"): np.array([[loaded, 0.0, 0.0]]),
+    }
+    forces = {Channel("loaded_motion", "tip"): 0.04}
+    record = StrokeRecord(np.ones(1), channels, forces=forces)
+    term = ObjectiveTerm(quantity="payload", case="push", output="tip", scale=0.5)
+    assert float(objective_value(record, term)) == pytest.approx(expected / 0.5)
+
+
+def test_other_objectives_are_finite_too() -> None:
+    motion = {Channel("motion", "tip"): np.array([[0.0, 0.2, 0.0]])}
+    record = StrokeRecord(np.ones(1), motion)
+    term = ObjectiveTerm(quantity="off_axis", case="push", output="tip", scale=-0.1)
+    assert -1e7 < float(objective_value(record, term)) < -1e5

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-from bellcrank.task import task_from_dict
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from bellcrank.task import find_task, task_from_dict
 from bellcrank.workflows.condition_texts import condition_texts
+
+if TYPE_CHECKING:
+    from bellcrank.model import Problem
 
 
 def test_every_load_of_a_task_is_listed() -> None:
@@ -69,3 +75,22 @@ def test_a_direction_in_space_without_a_name_has_components() -> None:
     )
     (text,) = condition_texts(task.problem, task.part)
     assert text == "input 2 mm along (0.00, 0.60, 0.80)"
+
+
+def test_a_material_without_a_known_limit_of_the_strain_is_remarked() -> None:
+    task = find_task("slider")
+    stiff = replace(task.part, material="tpu-95a")
+    (*same, remark) = condition_texts(without_strain(task.problem), stiff)
+    assert same == condition_texts(task.problem, task.part)
+    assert remark == "no limit of the strain: that of tpu-95a is not known"
+    # A bound of the task's own counts.
+    assert condition_texts(task.problem, stiff)[-1] != remark
+
+
+def without_strain(problem: Problem) -> Problem:
+    """The problem without its items on the strain."""
+    wanted = problem.specification
+    assert wanted is not None
+    items = tuple(each for each in wanted.items if each.quantity != "strain")
+    assert len(items) < len(wanted.items)
+    return replace(problem, specification=replace(wanted, items=items))

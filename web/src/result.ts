@@ -259,6 +259,7 @@ export class Result {
   private printedText(): string {
     const { tolerance } = this.known;
     if (!tolerance) return " Not checked over tolerances.";
+    if (tolerance === "running") return " The tolerance is being computed.";
     return typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} ${tolerance.met_words}.` : "";
   }
 
@@ -469,8 +470,6 @@ export class Result {
   }
 
   private showFiles(fault = ""): void {
-    // One process computes finite elements, tolerances and files, one after the other.
-    const waits = Object.values(this.known.fems).includes("running") || this.known.tolerance === "running" || this.known.print === "running";
     clear(this.filesBox,
       !isInSpace(this.subject.problem) && this.gripFields(),
       fault && h("p", { class: "fault", role: "alert" }, fault),
@@ -478,7 +477,7 @@ export class Result {
         ...(this.registries?.files ?? []).filter(this.isOffered).map(({ name: suffix, title, purpose }) => h("button", {
           type: "button", class: this.writing === suffix ? "file busy" : "file", disabled: this.writing !== "", "data-file": suffix,
           onclick: () => void this.downloadFile(suffix),
-        }, h("strong", {}, title), h("span", {}, this.writing === suffix ? (waits ? "written after the other computations …" : "writing …") : purpose))),
+        }, h("strong", {}, title), h("span", {}, this.writing === suffix ? (this.known.print === "running" ? "written after the print time …" : "writing …") : purpose))),
         this.subject.history && h("button", { type: "button", class: "file", "data-file": "history", disabled: this.writing !== "", onclick: () => void this.downloadHistory() },
           h("strong", {}, "History"), h("span", {}, "all proposals"))));
   }

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.mechanics.stroke_record import StrokeRecord
-    from bellcrank.model import Item
+    from bellcrank.model import Item, ObjectiveTerm
 
     Values = NDArray[np.float64]
 
@@ -39,6 +39,11 @@ PATH_POINTS = STEPS
 """Number of points at which a path is compared with the wanted one."""
 LARGEST_EXCESS = 1e3
 """Largest ratio of an excess to its scale, that of values that are infinite or unknown."""
+LARGEST_OBJECTIVE = 1e6
+"""Largest size of an objective, that of values that are infinite."""
+MOST_LOADS = 100.0
+"""Largest payload or dead load as an objective, over the load that is applied: a load that costs
+hardly any travel says nothing about one that halves it."""
 SMALLEST_TRAVEL = 1e-9
 """Travel below which ratios to it count as infinite."""
 
@@ -73,6 +78,20 @@ def quantity_values(
         lost = _ratio(motion[..., -1:, 0] - loaded, motion[..., -1:, 0])
         return _ratio(np.full(lost.shape, 0.5 * record.forces[own[0]]), np.maximum(lost, 0.0))
     return _of_motion(quantity, motion, *(record.channels[each] for each in own))
+
+
+def objective_value(record: StrokeRecord, term: ObjectiveTerm) -> Values:
+    """Return (...) the value of an objective over its scale, at full stroke.
+
+    It is finite unless a channel is unknown. An output that moves against its direction carries
+    nothing.
+    """
+    value = quantity_values(record, term.quantity, term.output)[..., -1]
+    if term.quantity in CARRIED:
+        force = record.forces[channels_of(term.quantity, term.output)[0]]
+        moved = record.of("motion", term.output)[..., -1, 0]
+        value = np.where(moved > 0.0, np.minimum(value, MOST_LOADS * force), 0.0)
+    return np.asarray(np.clip(value / term.scale, -LARGEST_OBJECTIVE, LARGEST_OBJECTIVE))
 
 
 def _of_motion(quantity: str, motion: Values, *channels: Values) -> Values:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from bellcrank.errors import InvalidProblem
-from bellcrank.mechanics import Channel, Status, StrokeRecord, channels_of, quantity_values
+from bellcrank.mechanics import Channel, Status, StrokeRecord, channels_of, objective_value
 from bellcrank.mechanics.frames.geometry import BeamSlopes, beam_slopes, geometry_slopes
 from bellcrank.mechanics.frames.joints import joint_slopes
 from bellcrank.mechanics.frames.quantities.definition import Measures, Quantity, Slopes, vector
@@ -226,10 +226,7 @@ class RowEvaluator:
             for model in self.models:
                 now = replace(record, channels=model.added_to(name, channels))
                 by_model += [bounded(item, now) for item in items]
-                found = [
-                    quantity_values(now, each.quantity, each.output)[..., -1:] / each.scale
-                    for each in wanted
-                ]
+                found = [objective_value(now, each)[..., None] for each in wanted]
             bounds = stacked(by_model)
             # Without objectives, the smallest margin is improved.
             return (stacked(found) if evaluator.objectives else -bounds), bounds

@@ -19,7 +19,7 @@ from bellcrank.mechanics import (
     channels_of,
     has_channels,
     item_results,
-    quantity_values,
+    objective_value,
     tightened,
     violation,
 )
@@ -261,10 +261,9 @@ class SpecificationEvaluator:
                 known.extremes[index] = reduced(item, record)
         for index, objective in enumerate(self.objectives):
             record = records[objective.case] if objective.case else first
-            quantity, output = objective.quantity, objective.output
-            if index not in known.objectives and has_channels(quantity, output, record):
-                value = quantity_values(record, quantity, output)[..., -1]
-                known.objectives[index] = value / objective.scale
+            is_known = has_channels(objective.quantity, objective.output, record)
+            if index not in known.objectives and is_known:
+                known.objectives[index] = objective_value(record, objective)
 
     def _violations(self, known: _Known) -> Values:
         """Return (..., I) the violations of all items that are known, in their order."""
@@ -374,8 +373,7 @@ class SpecificationEvaluator:
         found = []
         for objective in self.objectives:
             record = self.records[objective.case or next(iter(self.records))]
-            value = quantity_values(record, objective.quantity, objective.output)[..., -1]
-            found.append(float(value))
+            found.append(float(objective_value(record, objective)) * objective.scale)
         return found
 
     def results(self) -> list[ItemResult]:

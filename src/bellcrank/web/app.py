@@ -125,7 +125,7 @@ async def _prepare(state: AppState) -> None:
     else:
         state.ready = True
         with contextlib.suppress(BellcrankError):  # the first task in space compiles them then
-            await state.pools.slow.call(quick_calls.load_space_kernels)
+            await state.pools.checks.call(quick_calls.load_space_kernels)
 
 
 def _add_pages(app: FastAPI) -> None:

@@ -68,7 +68,11 @@ def _slow_key(function: Callable[..., dict[str, Any]], body: PartBody, *more: An
 
 
 async def _slow(
-    state: AppState, function: Callable[..., dict[str, Any]], body: PartBody, *more: Any
+    state: AppState,
+    pool: Pool,
+    function: Callable[..., dict[str, Any]],
+    body: PartBody,
+    *more: Any,
 ) -> dict[str, Any]:
     """Return the result of a slow computation on a part, which is also stored in a file."""
     text = json.dumps(body.problem)
@@ -76,7 +80,7 @@ async def _slow(
     async def compute(share: Path) -> dict[str, Any]:
         further = {"share": str(share)} if function in WITH_SHARE else {}
         call = partial(function, text, body.mask, body.part, *more, **further)
-        return await state.pools.slow.call(call)
+        return await pool.call(call)
 
     return await state.stored.get(_slow_key(function, body, *more), compute)
 
@@ -103,7 +107,7 @@ async def describe_part(body: GripBody, state: State) -> dict[str, Any]:
 @router.post("/print")
 async def estimate_print(body: PartBody, state: State) -> dict[str, Any]:
     """Return printing time, layers and mass of the part of a design by the slicer."""
-    return await _slow(state, slow_calls.print_estimate, body)
+    return await _slow(state, state.pools.files, slow_calls.print_estimate, body)
 
 
 @router.post("/response")
@@ -122,13 +126,13 @@ async def report_part(body: PartBody, state: State) -> dict[str, Any]:
 @router.post("/tolerance")
 async def get_tolerance(body: PartBody, state: State) -> dict[str, Any]:
     """Return what a design does over tolerances of print and drive, and without single struts."""
-    return await _slow(state, slow_calls.tolerance, body)
+    return await _slow(state, state.pools.checks, slow_calls.tolerance, body)
 
 
 @router.post("/validation")
 async def get_validation(body: FemBody, state: State) -> dict[str, Any]:
     """Return the finite-element analysis of the part of a design."""
-    return await _slow(state, slow_calls.validation, body, body.level)
+    return await _slow(state, state.pools.checks, slow_calls.validation, body, body.level)
 
 
 @router.post("/computations")
@@ -158,7 +162,7 @@ async def make_file(suffix: FileSuffix, body: FileBody, state: State) -> Respons
     """Return a file of a design for printing, cutting, viewing or simulation."""
     about = {"efficiency": body.efficiency, "provenance": body.provenance}
     text = json.dumps(body.problem)
-    pool = state.pools.thorough if page_files[suffix].quick else state.pools.slow
+    pool = state.pools.thorough if page_files[suffix].quick else state.pools.files
     content = await pool.call(
         slow_calls.design_file, text, body.mask, f".{suffix}", body.part, about, body.grips
     )

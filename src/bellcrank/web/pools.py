@@ -195,13 +195,16 @@ class Pools:
         Calls for live editing.
     thorough
         Calls for motions and sensitivities, a fraction of a second each.
-    slow
-        Calls for files, movies and finite elements.
+    files
+        Calls for files, movies and print times, seconds to a minute each.
+    checks
+        Calls for finite elements and tolerances, minutes each.
     """
 
     quick: Pool
     thorough: Pool
-    slow: Pool
+    files: Pool
+    checks: Pool
 
     async def prepare(self) -> None:
         """Start the pools of fast calls and load or compile the kernels."""
@@ -210,7 +213,7 @@ class Pools:
 
     def end(self) -> None:
         """End all processes."""
-        for pool in (self.quick, self.thorough, self.slow):
+        for pool in (self.quick, self.thorough, self.files, self.checks):
             pool.end()
 
 
@@ -219,5 +222,6 @@ def make_pools() -> Pools:
     return Pools(
         quick=Pool(1, seconds=120, waiting=64),
         thorough=Pool(1, seconds=120, waiting=32, niceness=2),
-        slow=Pool(1, seconds=1800, waiting=12, niceness=5, recycle=40),
+        files=Pool(1, seconds=600, waiting=12, niceness=3, recycle=40),
+        checks=Pool(1, seconds=1800, waiting=12, niceness=5, recycle=40),
     )

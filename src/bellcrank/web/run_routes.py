@@ -185,7 +185,7 @@ async def get_history(name: RunName, state: State) -> FileResponse:
     folder = Path(await run_in_threadpool(mkdtemp, prefix="bellcrank-"))
     clean = BackgroundTask(shutil.rmtree, folder, ignore_errors=True)
     try:
-        await state.pools.slow.call(curves.copy_history, run, folder)
+        await state.pools.files.call(curves.copy_history, run, folder)
     except BaseException:
         await clean()
         raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +25,8 @@ NAMED = 0.9999
 
 def condition_texts(problem: Problem, part: PartSpec) -> list[str]:
     """Return the input and the loads of each load case, each as one text.
+
+    The last one is a remark if nothing limits the strain, as the limit of the material is unknown.
 
     Parameters
     ----------
@@ -49,6 +52,10 @@ def condition_texts(problem: Problem, part: PartSpec) -> list[str]:
         ]
         texts = [_input_text(case.input, units), *_load_texts(case.loads, units), *springs]
         found += [f"{start}{text}" for text in texts]
+    wanted, material = problem.specification, part.registered_material
+    items = () if wanted is None else wanted.items
+    if math.isnan(material.strain_limit) and not any(each.quantity == "strain" for each in items):
+        found.append(f"no limit of the strain: that of {material.name} is not known")
     return found
 
 
