@@ -336,7 +336,7 @@ export class Result {
     const { tolerance } = this.known;
     if (tolerance === null) {
       clear(this.toleranceBox, h("p", { class: "note" }, "Widths, nodes, direction and stroke deviate, and single struts are lost: some 350 scenarios."),
-        button("Compute the tolerance", () => void this.computeTolerance(), "", { "data-key": "tolerance" }), h("span", { class: "more" }, " ten seconds to a minute"));
+        button("Compute the tolerance", () => void this.computeTolerance(), "", { "data-key": "tolerance" }), h("span", { class: "more" }, " ten seconds to some minutes"));
       return;
     }
     if (tolerance === "running") { clear(this.toleranceBox, h("p", { class: "more" }, h("span", { class: "working" }), `computing${this.shareText("tolerance")}`)); return; }

@@ -6,9 +6,9 @@ import type { Settings, TaskEditor } from "./editing";
 import { sentence } from "./text";
 
 const EFFORTS: [string, string, number, number, string][] = [
-  ["quick", "Quick", 2000, 2, "Half a minute of search."],
-  ["usual", "Standard", 8000, 2, "A minute or two of search."],
-  ["long", "Thorough", 25000, 4, "Some ten minutes of search; for tasks that Standard does not meet."],
+  ["quick", "Quick", 2000, 2, "Half a minute of search for a small flat part."],
+  ["usual", "Standard", 8000, 2, "A minute or two of search for a small flat part; longer with more nodes and in space."],
+  ["long", "Thorough", 25000, 4, "Some ten minutes of search for a small flat part; for tasks that Standard does not meet."],
 ];
 
 const REFINED = " The refinement of the best designs takes some minutes more; it can be stopped at any time and keeps what it has reached.";

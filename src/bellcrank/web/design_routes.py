@@ -132,7 +132,9 @@ async def get_tolerance(body: PartBody, state: State) -> dict[str, Any]:
 @router.post("/validation")
 async def get_validation(body: FemBody, state: State) -> dict[str, Any]:
     """Return the finite-element analysis of the part of a design."""
-    return await _slow(state, state.pools.checks, slow_calls.validation, body, body.level)
+    # Frames take seconds and do not wait for the checks that take minutes.
+    pool = state.pools.files if body.level == "frame" else state.pools.checks
+    return await _slow(state, pool, slow_calls.validation, body, body.level)
 
 
 @router.post("/computations")

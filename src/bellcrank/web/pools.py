@@ -196,9 +196,9 @@ class Pools:
     thorough
         Calls for motions and sensitivities, a fraction of a second each.
     files
-        Calls for files, movies and print times, seconds to a minute each.
+        Calls for files, movies, print times and frames, seconds to a minute each.
     checks
-        Calls for finite elements and tolerances, minutes each.
+        Calls for finite elements of the outline or the body and for tolerances, minutes each.
     """
 
     quick: Pool
