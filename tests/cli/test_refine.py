@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bellcrank.model import find_problem, read_design, write_design
+from bellcrank.refine import RefinementSettings
 from bellcrank.workflows import find_design
 
 from .helpers import call, refusal
@@ -21,13 +22,18 @@ pytestmark = pytest.mark.usefixtures("here")
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, str]]:
-    """The same search with its refinement and without it."""
+    """The same search with a short refinement and without one."""
     found = {}
-    for option in ("--refine", "--no-refine"):
-        folder = tmp_path_factory.mktemp("refine") / "inverter"
-        outcome = call("design", "inverter", "--steps", 1000, "--seed", 1, option, "--out", folder)
-        assert outcome.code == 0, outcome.err
-        found[option] = (folder, outcome.out)
+    with pytest.MonkeyPatch.context() as patch:
+        first, further = RefinementSettings(evaluations=20), RefinementSettings(evaluations=40)
+        patch.setattr("bellcrank.workflows.refinement.FIRST", first)
+        patch.setattr("bellcrank.workflows.refiners.SETTINGS", further)
+        for option in ("--refine", "--no-refine"):
+            folder = tmp_path_factory.mktemp("refine") / "inverter"
+            words = ("inverter", "--steps", 1000, "--seed", 1, option, "--out", folder)
+            outcome = call("design", *words)
+            assert outcome.code == 0, outcome.err
+            found[option] = (folder, outcome.out)
     return found
 
 

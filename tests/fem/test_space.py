@@ -103,8 +103,9 @@ def test_a_solid_moves_as_a_frame_of_eight_elements() -> None:
     # The hub at the end of the strut turns by a little less than its axis.
     assert analysis.last.rotation == pytest.approx(np.linalg.norm(turned.rotation), rel=0.05)
     beams = levels["frame"](spec.of(design), FemSettings(elements=8)).last
-    assert beams.off_axis == pytest.approx(turned.off_axis, rel=1e-6)
-    assert beams.rotation == pytest.approx(np.linalg.norm(turned.rotation), rel=1e-6)
+    # The material of the part has another Poisson's ratio.
+    assert beams.off_axis == pytest.approx(turned.off_axis, rel=1e-3)
+    assert beams.rotation == pytest.approx(np.linalg.norm(turned.rotation), rel=1e-2)
     assert len(analysis.last.force) == 3
     assert not len(analysis.contacts.pairs)
     assert validation.doubts == []

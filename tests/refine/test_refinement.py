@@ -60,7 +60,7 @@ def test_the_derivatives_of_earlier_steps_are_not_kept() -> None:
     alive = []
 
     def report(progress: Progress) -> bool:
-        alive.append(sum(isinstance(each, Rows) for each in gc.get_objects()))
+        alive.append(sum(type(each) is Rows for each in gc.get_objects()))
         return len(alive) < 8
 
     refine_design(unloaded_crane(), RefinementSettings(steps=20), report)

@@ -80,18 +80,18 @@ def quantity_values(
     return _of_motion(quantity, motion, *(record.channels[each] for each in own))
 
 
-def objective_value(record: StrokeRecord, term: ObjectiveTerm) -> Values:
+def objective_value(record: StrokeRecord, objective: ObjectiveTerm) -> Values:
     """Return (...) the value of an objective over its scale, at full stroke.
 
     It is finite unless a channel is unknown. An output that moves against its direction carries
     nothing.
     """
-    value = quantity_values(record, term.quantity, term.output)[..., -1]
-    if term.quantity in CARRIED:
-        force = record.forces[channels_of(term.quantity, term.output)[0]]
-        moved = record.of("motion", term.output)[..., -1, 0]
+    value = quantity_values(record, objective.quantity, objective.output)[..., -1]
+    if objective.quantity in CARRIED:
+        force = record.forces[channels_of(objective.quantity, objective.output)[0]]
+        moved = record.of("motion", objective.output)[..., -1, 0]
         value = np.where(moved > 0.0, np.minimum(value, MOST_LOADS * force), 0.0)
-    return np.asarray(np.clip(value / term.scale, -LARGEST_OBJECTIVE, LARGEST_OBJECTIVE))
+    return np.asarray(np.clip(value / objective.scale, -LARGEST_OBJECTIVE, LARGEST_OBJECTIVE))
 
 
 def _of_motion(quantity: str, motion: Values, *channels: Values) -> Values:
