@@ -222,6 +222,6 @@ def make_pools() -> Pools:
     return Pools(
         quick=Pool(1, seconds=120, waiting=64),
         thorough=Pool(1, seconds=120, waiting=32, niceness=2),
-        files=Pool(1, seconds=600, waiting=12, niceness=3, recycle=40),
+        files=Pool(1, seconds=1800, waiting=12, niceness=3, recycle=40),
         checks=Pool(1, seconds=1800, waiting=12, niceness=5, recycle=40),
     )
