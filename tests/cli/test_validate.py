@@ -72,6 +72,8 @@ def test_the_table_says_what_the_json_says() -> None:
     assert [entry["theory"] for entry in data["results"]] == ["euler-bernoulli", "timoshenko"]
     for entry in data["results"]:
         assert f" {entry['efficiency']:.4f} " in outcome.out
+        assert f" {entry['off_axis']:.1%} " in outcome.out
+        assert f" {entry['output_rotation_deg']:.2g} deg " in outcome.out
     assert f" {data['discrete_model']['efficiency']:.4f} " in outcome.out
     assert data["efficiency"] == data["results"][0]["efficiency"]
 

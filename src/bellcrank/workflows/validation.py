@@ -21,7 +21,7 @@ from bellcrank.part import PartSpec, read_length
 from bellcrank.part.pieces import check_supported, connection_warnings
 from bellcrank.provenance import provenance
 from bellcrank.search.verification import ELEMENTS
-from bellcrank.workflows.figures import model_words
+from bellcrank.workflows.figures import figures_of, model_words
 from bellcrank.workflows.part_figures import SHEET_QUANTITIES, part_figures, sheet_figures
 from bellcrank.workflows.specification import item_data, results_for
 
@@ -56,6 +56,8 @@ class Validation:
         Size and material of the part.
     response
         Response in the model of searches: springs, or a frame with one element in each beam.
+    searched
+        Figures of this response (`bellcrank.workflows.figures.figures_of`).
     plan
         Levels and settings.
     analyses
@@ -72,6 +74,7 @@ class Validation:
     design: Design
     spec: PartSpec
     response: Response
+    searched: dict[str, Any]
     plan: Plan
     analyses: list[Analysis]
     items: dict[str, list[ItemResult]] = field(default_factory=dict)
@@ -305,8 +308,10 @@ def validate(
     """
     check_plan(design, spec, plan)
     part = spec.of(design)
-    response = model_evaluator(design.problem).evaluate(design.mask, VERIFICATION_INCREMENT)
-    validation = Validation(design, spec, response, plan, [])
+    evaluator = model_evaluator(design.problem)
+    response = evaluator.evaluate(design.mask, VERIFICATION_INCREMENT)
+    searched = figures_of(evaluator, response)
+    validation = Validation(design, spec, response, searched, plan, [])
     for index, (level, settings) in enumerate(plan):
         analysis = levels[level].analyse(
             part, settings, lambda load, index=index: report(index, load)

@@ -98,9 +98,10 @@ def point_of(part: Part, frame: PartFrame, state: FrameState) -> StrokePoint:
     problem = part.design.problem
     force = state.reaction + state.load * frame.load
     motion, output = state.displacement[: len(part.positions)], problem.output.nodes
-    rotation = best_fit_rotation(part.positions[output], motion[output, :2])
     if len(output) == 1:
         rotation = np.degrees(motion[output[0], 2])
+    else:
+        rotation = best_fit_rotation(part.positions[output], motion[output, :2])
     return stroke_point(
         part,
         state.load,
