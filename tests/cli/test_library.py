@@ -11,7 +11,7 @@ import pytest
 from bellcrank.machines import elementary
 from bellcrank.machines.library import Library, bundled_folder, find_entry, read_entry
 from bellcrank.model import read_design, write_design
-from tests.machines.test_library_making import shorten
+from tests.refinements import make_without_sheet
 
 from .helpers import call, refusal
 
@@ -134,7 +134,7 @@ def test_a_design_is_added_to_ones_own_folder(lever: Path, own: Path) -> None:
 def test_entries_are_made_where_one_wants_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shorten(monkeypatch)
+    make_without_sheet(monkeypatch)
     words = (
         "library", "make", "--directions", "up", "--columns", "5", "--kinds", "straight-10g",
         "--steps", 300, "--chains", 2, "--out", tmp_path / "made",

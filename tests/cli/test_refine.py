@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from bellcrank.model import find_problem, read_design, write_design
-from bellcrank.refine import RefinementSettings
 from bellcrank.workflows import find_design
+from tests.refinements import shorten
 
 from .helpers import call, refusal
 
@@ -25,9 +25,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, str]
     """The same search with a short refinement and without one."""
     found = {}
     with pytest.MonkeyPatch.context() as patch:
-        first, further = RefinementSettings(evaluations=20), RefinementSettings(evaluations=40)
-        patch.setattr("bellcrank.workflows.refinement.FIRST", first)
-        patch.setattr("bellcrank.workflows.refiners.SETTINGS", further)
+        shorten(patch, 20, 40)
         for option in ("--refine", "--no-refine"):
             folder = tmp_path_factory.mktemp("refine") / "inverter"
             words = ("inverter", "--steps", 1000, "--seed", 1, option, "--out", folder)

@@ -10,7 +10,7 @@ import threading
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -21,51 +21,38 @@ from bellcrank.machines.library.catalogue import entry_files
 from bellcrank.machines.library.tasks import OFF_AXIS, ROTATION, SAG, EntryTask, MakeSettings
 from bellcrank.mechanics import model_evaluator
 from bellcrank.model import Section
-from bellcrank.refine import RefinementSettings
 from bellcrank.storage.locking import LOCK, locked
 from bellcrank.workflows.library_making import SEARCHES, make
 from bellcrank.workflows.refinement import refine_selection
+from tests.refinements import make_without_sheet
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bellcrank.part import PartSpec
-    from bellcrank.search import Progress, Selection
+    from bellcrank.search import Progress
 
 KINDS = ("straight-10g", "straight-50g")
 SETTINGS = MakeSettings(directions=("up",), columns=(5,), kinds=KINDS, steps=300, chains=2)
-FIRST = RefinementSettings(evaluations=10)
-FURTHER = RefinementSettings(evaluations=30)
 ROOT = Path(__file__).parents[2]
 TIMED = ("provenance", "checksum")
 SCRIPT = """
 import sys
 from pathlib import Path
 import pytest
-from tests.machines.test_library_making import SETTINGS, shorten
+from tests.machines.test_library_making import SETTINGS
+from tests.refinements import make_without_sheet
 from bellcrank.workflows.library_making import make
-shorten(pytest.MonkeyPatch())
+make_without_sheet(pytest.MonkeyPatch())
 for made in make(SETTINGS, Path(sys.argv[1]), workers=1):
     pass
 """
-
-
-def shorten(patch: pytest.MonkeyPatch) -> None:
-    """Refine in a few steps, without the sheet."""
-
-    def refine(selection: Selection, _part: PartSpec, **options: Any) -> Any:
-        return refine_selection(selection, None, **options)
-
-    patch.setattr("bellcrank.workflows.refinement.FIRST", FIRST)
-    patch.setattr("bellcrank.workflows.refiners.SETTINGS", FURTHER)
-    patch.setattr("bellcrank.workflows.library_making.refine_selection", refine)
 
 
 @pytest.fixture(scope="module", autouse=True)
 def short_refinement() -> Iterator[None]:
     """Refine in a few steps, without the sheet."""
     with pytest.MonkeyPatch.context() as patch:
-        shorten(patch)
+        make_without_sheet(patch)
         yield
 
 
