@@ -137,8 +137,8 @@ def test_no_process_outlives_its_server(tmp_path: Path, end: int) -> None:
         body = {"title": "t", "session": "s", "problem": crane["problem"], "steps": 1_000_000}
         name = client.post("/api/runs", json=body).json()["id"]
         wait_for(lambda: client.get(f"/api/runs/{name}").json()["done"] > 0)
-        # Three pools and a search; a resource tracker and the server itself.
-        assert len(marked(mark)) == 6
+        # Four pools and a search; a resource tracker and the server itself.
+        assert len(marked(mark)) == 7
     wait_for(lambda: not marked(mark), seconds=30)
 
 
