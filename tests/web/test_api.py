@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import time
 import zipfile
 from typing import TYPE_CHECKING, Any
 
@@ -196,6 +197,19 @@ def test_every_other_file_is_of_its_kind(
     answer = client.post(f"/api/files/{suffix}", json=body)
     assert answer.status_code == 200, answer.text
     assert answer.content[place:].replace(b"\r", b"").lstrip().startswith(sign)
+
+
+def test_a_file_and_a_frame_do_not_wait_for_a_check(
+    client: TestClient, crane: dict[str, Any]
+) -> None:
+    checks = client.app.state.bellcrank.pools.checks  # type: ignore[attr-defined]
+    assert client.portal is not None
+    client.portal.call(checks.call, abs, -1)  # its process has started
+    busy = client.portal.start_task_soon(checks.call, time.sleep, 45.0)
+    body = {"problem": crane["problem"], "mask": crane["mask"]}
+    assert client.post("/api/files/stl", json=body).status_code == 200
+    assert client.post("/api/validation", json={**body, "level": "frame"}).status_code == 200
+    assert not busy.done()
 
 
 @pytest.mark.slow
