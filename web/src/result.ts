@@ -79,6 +79,8 @@ export class Result {
   private readonly knownOf = new Map<string, Known>();
   private following = false;
   private closed = false;
+  /** Ends the requests of this result when it is left: a browser has few connections to a server, which goes on with what it computes. */
+  private readonly requests = new AbortController();
   /** The part with the plate and the pads; a text says why it cannot be made. */
   private gripped: Remarks | string | null = null;
 
@@ -184,7 +186,7 @@ export class Result {
   /** Whether the design was selected by frame analysis of its part. */
   private get isPart(): boolean { return Boolean(this.subject.part ?? this.subject.provenance["part"]); }
 
-  close(): void { this.closed = true; this.player.close(); }
+  close(): void { this.closed = true; this.requests.abort(); this.player.close(); }
 
   private async loadReport(): Promise<void> {
     const asked = ++this.reports;
@@ -306,7 +308,7 @@ export class Result {
     void this.follow();
     try {
       const { problem, mask } = this.subject;
-      const found = await post<Fem>("/validation", { problem, mask, part: this.part, level });
+      const found = await post<Fem>("/validation", { problem, mask, part: this.part, level }, this.requests.signal);
       known.fems[level] = found;
       if (show && found.picture) this.player.showStress(found.picture);
     } catch (error) {
@@ -322,7 +324,7 @@ export class Result {
     void this.follow();
     const { problem, mask } = this.subject;
     try {
-      known.tolerance = await post<ToleranceFound>("/tolerance", { problem, mask, part: this.part });
+      known.tolerance = await post<ToleranceFound>("/tolerance", { problem, mask, part: this.part }, this.requests.signal);
       this.player.showLosses(known.tolerance.losses);
     } catch (error) {
       known.tolerance = sentence((error as ServerError).message);
@@ -423,7 +425,7 @@ export class Result {
     known.print = "running";
     this.showPart();
     try {
-      known.print = await post<Print>("/print", { problem, mask, part: this.part });
+      known.print = await post<Print>("/print", { problem, mask, part: this.part }, this.requests.signal);
     } catch (error) {
       known.print = sentence((error as ServerError).message);
     }
@@ -477,7 +479,7 @@ export class Result {
         ...(this.registries?.files ?? []).filter(this.isOffered).map(({ name: suffix, title, purpose }) => h("button", {
           type: "button", class: this.writing === suffix ? "file busy" : "file", disabled: this.writing !== "", "data-file": suffix,
           onclick: () => void this.downloadFile(suffix),
-        }, h("strong", {}, title), h("span", {}, this.writing === suffix ? (this.known.print === "running" ? "written after the print time …" : "writing …") : purpose))),
+        }, h("strong", {}, title), h("span", {}, this.writing === suffix ? "writing …" : purpose))),
         this.subject.history && h("button", { type: "button", class: "file", "data-file": "history", disabled: this.writing !== "", onclick: () => void this.downloadHistory() },
           h("strong", {}, "History"), h("span", {}, "all proposals"))));
   }
