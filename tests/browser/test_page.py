@@ -403,6 +403,21 @@ def test_a_whole_search_is_compared_checked_by_finite_elements_and_leaves_its_hi
     assert downloaded(page, "svg").lstrip()[:1] == b"<"
 
 
+def test_a_result_that_is_left_ends_its_requests(page: Any, server: Server) -> None:
+    """A browser has few connections to a server, which an open check would keep."""
+    ended: list[str] = []
+    page.on("requestfailed", lambda request: ended.append(request.url))
+    page.route("**/api/tolerance", lambda _route: None)  # it is never answered
+    page.goto(f"{server.address}/#/design/builtin/machine-crane")
+    page.locator(".figures.part").wait_for()
+    page.get_by_role("button", name="Compute the tolerance").click()
+    page.locator(".verdict", has_text="The tolerance is being computed").wait_for()
+    assert not [url for url in ended if url.endswith("/tolerance")]
+    page.goto(f"{server.address}/#/gallery")
+    page.locator(".tile").first.wait_for()
+    until(page, lambda: any(url.endswith("/tolerance") for url in ended))
+
+
 def test_the_tolerance_of_a_design_is_shown_and_it_is_compared_with_another(
     page: Any, server: Server
 ) -> None:
