@@ -53,7 +53,7 @@ def test_a_task_in_space_is_stated_by_layers_nodes_and_keys(page: Any) -> None:
     tool(page, "Supports")
     layer = page.get_by_label("Layer of nodes")
     layer.select_option("0")
-    page.get_by_role("button", name="Add all nodes of the layer").click()
+    page.get_by_role("button", name="Add all free nodes of the layer").click()
     until(page, lambda: summary(page, "supports") == "10 nodes")
     assert task(page)["table"]["supports"][0]["at"] == [{"face": "bottom"}]
 

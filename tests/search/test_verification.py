@@ -378,6 +378,22 @@ def test_unmet_designs_of_each_chain_are_verified(lift: Problem) -> None:
     assert shortlist(listed) == [listed[0], listed[2]]
 
 
+def test_the_reserve_has_other_designs_that_differ_from_each_other(lift: Problem) -> None:
+    item = Item(quantity="gain", case="case", output="output", at_least=2.0)
+    items = (ItemResult(item, 1.0, 0.5, -0.5),)
+    full, works = (
+        replace(finalist(lift, mask), items=items) for mask in (pack_mask(lift.initial), WORKS)
+    )
+    mask = works.design.mask.copy()
+    mask[np.flatnonzero(mask)[0]] = False
+    nearly = replace(works, design=works.design.with_mask(mask))
+    brittle = Verifier(lift, HoppingSettings(), strain_limit=0.08)
+    found = FirstWithoutFault(brittle)([works, nearly, full])
+    assert found.finalist.design is full.design
+    assert found.others == []
+    assert found.reserve == [works]
+
+
 def test_designs_in_space_are_verified() -> None:
     problem, data = read_reference("octet-crane")
     mask = unpack_mask(data["results"][0]["mask"], problem.lattice.beam_count)

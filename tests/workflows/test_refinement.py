@@ -6,12 +6,14 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 
 from bellcrank.mechanics import ItemResult
 from bellcrank.model import Design, Item
 from bellcrank.part import PartSpec
 from bellcrank.refine import Refinement
+from bellcrank.refine.refinement import Progress
 from bellcrank.refine.state import State
 from bellcrank.search.selection import Candidate, Finalist, Selection
 from bellcrank.task import find_task
@@ -86,3 +88,50 @@ def test_others_are_refined_if_the_best_miss_items_in_the_sheet_only(
     assert len(further) == CHAINS * batches
     assert chosen is not None
     assert chosen.after is further[best].after
+
+
+@pytest.mark.parametrize(
+    ("met", "sheet", "is_refined"),
+    [(True, GOOD, False), (True, BAD, True), (False, None, True)],
+    ids=["met", "missed in the sheet", "missed"],
+)
+def test_the_reserve_is_refined_only_if_no_other_design_meets_all_items(
+    monkeypatch: pytest.MonkeyPatch, met: bool, sheet: ItemResult | None, is_refined: bool
+) -> None:
+    given = selection()
+    reserve = tuple(replace(each, efficiency=2.0) for each in (given.design,) * CHAINS)
+    finalists = tuple(
+        Finalist(Candidate(1.0, chain, 0, b""), design, given.response)
+        for chain, design in enumerate(reserve)
+    )
+    given = replace(given, reserve=finalists)
+    state = State(1.0, (GOOD,), met=True)
+    plain = Refinement(given.design, state, state, 1, 1, 0, "500 geometries", improved=True)
+    reported: list[int] = []
+
+    def refine(
+        designs: Sequence[Design], spec: PartSpec | None, report: Any, *_: Any
+    ) -> list[Refinement]:
+        rows: Any = None
+        progress = Progress(0, 0, np.zeros(0), rows, 1.0)
+        for index in range(len(designs)):
+            report(index, progress)
+        of_reserve = designs[0].efficiency == 2.0
+        missed = replace(state, met=met, sheet=() if sheet is None else (sheet,))
+        after = replace(state, sheet=(GOOD,)) if of_reserve else missed
+        after = state if spec is None else after
+        sheets = int(bool(after.sheet))
+        return [replace(plain, design=each, after=after, sheets=sheets) for each in designs]
+
+    monkeypatch.setattr(refinement, "refine_designs", refine)
+    verification: Any = SimpleNamespace(fault=None)
+    monkeypatch.setattr(
+        refinement,
+        "_verified",
+        lambda finalist, design: replace(finalist, design=design, verification=verification),
+    )
+    found, chosen = refine_selection(given, PartSpec(), lambda number, _: reported.append(number))
+    assert chosen is not None
+    assert (found.design.efficiency == 2.0) == is_refined
+    # Designs of the reserve have numbers of their own.
+    assert (max(reported) >= 1 + len(given.others)) == is_refined

@@ -30,11 +30,22 @@ export interface Specification {
   output: string;
   outputs?: Record<string, Problem["output"]>;
   cases?: { name: string; input: Problem["input"]; outputs: Record<string, Problem["output"]> }[];
-  items: unknown[];
-  maximise: unknown[];
+  items: Wanted[];
+  maximise: Wanted[];
 }
 
+/** A quantity of an output that is bounded or maximised. */
+export interface Wanted { quantity: string; case: string; at_least?: number | null; at_most?: number | null }
+
 export function isInSpace({ positions }: Pick<Problem, "positions">): boolean { return positions[0]?.length === 3; }
+
+/** Whether an output of a load case is to turn, and none is to move. */
+export function isTurning({ specification }: Problem, loadCase: string): boolean {
+  const { items = [], maximise = [] } = specification ?? {};
+  const own = [...items, ...maximise].filter((each) => each.case === loadCase);
+  const turns = own.some((each) => each.quantity === "rotation" && (maximise.includes(each) || (each.at_least ?? -1) > 0 || (each.at_most ?? 1) < 0));
+  return turns && !own.some(({ quantity }) => quantity === "gain" || quantity === "travel");
+}
 
 /** The mechanical model of a problem in words. */
 export function modelOf(problem: Problem): string { return problem.section ? "frames" : "spring model"; }

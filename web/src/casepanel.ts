@@ -12,21 +12,21 @@ import {
 type Bound = "at_least" | "at_most" | "value" | "target";
 
 /** What a single value of a quantity bounds, an example, and what the quantity is. */
-interface Usual { title: string; bound: Bound; example: string; about: string }
+interface Usual { title: string; bound: Bound; example: string; about: string; /** Unit of a bare number. */ unit?: string }
 
 const USUAL: Record<QuantityName, Usual> = {
   gain: { title: "motion gain", bound: "at_least", example: "2", about: "Motion of the output along its direction, over the stroke of the input." },
-  travel: { title: "travel, mm", bound: "at_least", example: "5 mm", about: "Motion of the output along its direction." },
+  travel: { title: "travel", unit: "mm", bound: "at_least", example: "5 mm", about: "Motion of the output along its direction." },
   off_axis: { title: "off-axis motion", bound: "at_most", example: "10%", about: "Largest motion normal to the direction, over the travel." },
-  rotation: { title: "rotation", bound: "value", example: "5 deg", about: "Rotation of the output, counter-clockwise positive." },
-  payload: { title: "payload", bound: "at_least", example: "10 g", about: "Load against the direction of the output that grows with the input, as that of a workpiece, and halves the travel. With a force of the tool Loads all items hold under it." },
-  dead_load: { title: "dead load", bound: "at_least", example: "10 g", about: "Weight against the direction of the output that acts before the input, and halves the travel." },
-  stiffness: { title: "stiffness", bound: "at_least", example: "0.1 N/mm", about: "Stiffness of the output along its direction at the full stroke." },
-  blocked_force: { title: "blocked force", bound: "at_least", example: "0.1 N", about: "Force of the output on a stop that prevents its travel." },
+  rotation: { title: "rotation", unit: "°", bound: "value", example: "5 deg", about: "Rotation of the output, counter-clockwise positive." },
+  payload: { title: "payload", unit: "N", bound: "at_least", example: "10 g", about: "Load against the direction of the output that grows with the input, as that of a workpiece, and halves the travel. With a force of the tool Loads all items hold under it." },
+  dead_load: { title: "dead load", unit: "N", bound: "at_least", example: "10 g", about: "Weight against the direction of the output that acts before the input, and halves the travel." },
+  stiffness: { title: "stiffness", unit: "N/mm", bound: "at_least", example: "0.1 N/mm", about: "Stiffness of the output along its direction at the full stroke." },
+  blocked_force: { title: "blocked force", unit: "N", bound: "at_least", example: "0.1 N", about: "Force of the output at full stroke on a stop where it rests. To hold an object: ask for the travel up to it, and for this force." },
   sag: { title: "sag under own weight", bound: "at_most", example: "10%", about: "Motion of the output by the own weight, over its travel." },
 };
 
-const INPUT_FORCE: Usual = { title: "input force", bound: "at_most", example: "1 N", about: "Force of the input along its direction." };
+const INPUT_FORCE: Usual = { title: "input force", unit: "N", bound: "at_most", example: "1 N", about: "Force of the input along its direction." };
 const ROTATION_IN_SPACE = "Size of the mean rotation of the output nodes, about whatever axis it has; a rotational symmetry (Limits and tolerance) makes this the vertical axis. Nodes of an input move along its direction only: let the input be the middle of a plate that should turn.";
 
 /** Quantities that may be maximised. */
@@ -58,6 +58,7 @@ export function casePanel(editor: TaskEditor, kind: "inputs" | "outputs" | "load
       sections.length > 1 && !isActive && button("Select its nodes", () => editor.aimAt(target), "quiet small", { "data-key": `aim-${kind}-${index}` }),
       ...make(editor, each as never, target),
       kind !== "loads" && imageButton(editor, kind, target),
+      kind === "inputs" && middleButton(editor, target),
       h("div", { class: "row between" },
         button("Clear nodes", () => editor.change(withSection(editor.task.table, editor.loadCase, target, { at: [] })), "quiet small", { disabled: !nodes, "data-key": `clear-${kind}-${index}` }),
         (sections.length > 1 || kind === "loads") && button(`Remove ${noun} ${index + 1}`, drop, "quiet small", { "data-key": `drop-${kind}-${index}` })));
@@ -96,6 +97,19 @@ function imageButton(editor: TaskEditor, kind: "inputs" | "outputs", { index }: 
     editor.change(withSections(table, loadCase, kind, [...sections, image] as never));
   };
   return button("Add its mirror image", add, "quiet small", { "data-key": `image-${kind}-${index}` });
+}
+
+/** In space, where an input of several nodes keeps an output from turning: a button that keeps its middle node. */
+function middleButton(editor: TaskEditor, target: Target): HTMLElement | null {
+  const { task: { table }, built, loadCase } = editor;
+  const nodes = built ? nodesOf(built, loadCase, "inputs")[target.index] ?? [] : [];
+  if (!built || !isSpatial(table) || nodes.length < 2 || !(sectionsOf(table, loadCase, "outputs") as OutputTable[]).some(isTurn)) return null;
+  const { positions } = built.lattice;
+  const away = (node: number): number => Math.hypot(...[0, 1, 2].map((axis) => positions[node]![axis]! - nodes.reduce((sum, each) => sum + positions[each]![axis]!, 0) / nodes.length));
+  const middle = nodes.reduce((a, b) => (away(b) < away(a) - 1e-9 ? b : a));
+  return h("div", {},
+    h("p", { class: "note" }, "Nodes of an input move along its direction only: they do not turn about it with the output."),
+    button("Keep its middle node only", () => set(editor, target, { at: regionsOf([middle], positions, built.part.scale) }), "quiet small", { "data-key": `middle-${target.index}` }));
 }
 
 function set(editor: TaskEditor, target: Target, changes: Record<string, unknown>): void {
@@ -225,7 +239,7 @@ function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HT
 }
 
 /** What is wanted of a quantity: one bound, whether it is maximised, and everything else on demand. */
-function itemRow(key: string, name: string, { title, bound: usual, example, about }: Usual, bounds: Bounds, put: (next: Bounds | null) => void): HTMLElement {
+function itemRow(key: string, name: string, { title, bound: usual, example, about, unit = "" }: Usual, bounds: Bounds, put: (next: Bounds | null) => void): HTMLElement {
   const isMaximised = bounds.maximise === true || bounds.value === "maximise";
   // Only a rotation has a single value that means a bound on both sides.
   const offered: [Bound, string][] = [["at_least", "at least"], ["at_most", "at most"], ["target", "equal to"]];
@@ -249,7 +263,7 @@ function itemRow(key: string, name: string, { title, bound: usual, example, abou
   const hasMore = extra.some((other) => other !== bound && known[other] !== undefined) || known.of !== undefined;
   const of = select([["", "every value"], ["largest", "the largest"], ["smallest", "the smallest"], ["spread", "the spread"]], known.of ?? "", (picked) => change({ of: picked || undefined } as Bounds));
   of.dataset.key = `${key}-of`;
-  const input = amount(key, "", value, "", (next) => change({ [bound]: next }), value === undefined && !isMaximised ? `such as ${example}` : "");
+  const input = amount(key, "", value, typeof value === "string" ? "" : unit, (next) => change({ [bound]: next }), value === undefined && !isMaximised ? `such as ${example}` : "");
   input.querySelector("label")!.remove();
   input.querySelector("input")!.setAttribute("aria-label", title);
   return h("div", { class: "item", "data-item": name },

@@ -73,6 +73,8 @@ export class Editor implements TaskEditor {
   private timer = 0;
   private rest = 0;
   private sent = "";
+  /** Whether another task was opened since the latest one was built. */
+  private isOther = true;
   private readonly onLeave = (): void => this.store();
   private readonly onStorage = (event: StorageEvent): void => this.noteOtherTab(event);
   private readonly actions: CanvasActions = {
@@ -191,6 +193,7 @@ export class Editor implements TaskEditor {
 
   open(task: Task): void {
     this.loadCase = 0;
+    this.isOther = true;
     this.set(task);
     this.choose(this.tool === "hand" ? "supports" : this.tool);
   }
@@ -330,7 +333,8 @@ export class Editor implements TaskEditor {
       this.fault = this.built.fault && this.faultOf(this.built.fault);
       const { lattice } = this.built;
       const same = !before || (before.beams.length === lattice.beams.length && JSON.stringify(before.positions) === JSON.stringify(lattice.positions));
-      if (former && !same) this.nameMoved(former, this.built);
+      if (former && !same && !this.isOther) this.nameMoved(former, this.built);
+      if (this.isOther) this.isOther = false;
       if (this.task.hand && !(same && this.task.hand.length === hexOf(new Uint8Array(lattice.beams.length)).length)) {
         this.history.set({ ...this.task, hand: null }, true);
       }

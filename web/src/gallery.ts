@@ -3,7 +3,7 @@
 import { get, type Run, type Collection } from "./api";
 import { ago, count, figure, h } from "./dom";
 import { collectionView, tile } from "./collections";
-import { sentence } from "./text";
+import { sentence, statusName } from "./text";
 
 /** Number of designs of a collection shown at first: three rows. */
 const SHOWN = 15;
@@ -18,7 +18,7 @@ export async function galleryPage(): Promise<HTMLElement> {
 
 /** The status of a search; one that has run and waits for its turn is not like one that has not started. */
 function statusText(run: Run, share: number): string {
-  if (run.status !== "queued") return run.status;
+  if (run.status !== "queued") return statusName(run.status);
   const state = run.done > 0 ? `waiting for its turn, ${figure(100 * share, 0)} % done` : "queued";
   return run.place ? `${state}, ${count(run.place, "search", "searches")} ahead` : state;
 }

@@ -101,6 +101,7 @@ export class Panels {
       editor.tool === "hand" && this.hand(),
       this.searchBox.make());
     this.showItems();
+    this.markFault();
     // What was unfolded stays so.
     for (const key of unfolded) this.element.querySelector(`summary[data-key="${CSS.escape(key)}"]`)?.parentElement!.setAttribute("open", "");
     this.restore(kept);
@@ -183,6 +184,17 @@ export class Panels {
     const owner = (text: string): string => OWNERS.find(([pattern]) => pattern.test(text))?.[1] ?? "domain";
     if (fault) return owner(fault.key || fault.message) === key ? fault.text : "";
     return missing && owner(missing) === key ? NEEDED[key] ?? "" : "";
+  }
+
+  /** Mark the field that an error is about. */
+  private markFault(): void {
+    const key = this.editor.fault?.key ?? "";
+    const [, kind, index, name] = /(supports|inputs|outputs|loads)\[(\d+)\]\.(\w+)/.exec(key) ?? [];
+    const [, owner, own] = /^(part|limits|tolerance|domain)\.(\w+)/.exec(key) ?? [];
+    const keys = kind ? [`${kind}-${index}-${name}-0`, `${kind}-${index}-${name}`, `${kind}-${index}-amount`]
+      : owner === "domain" ? ["domain-width", "domain-depth", "domain-height"] : owner ? [`${owner === "limits" ? "limit" : owner}-${own}`] : [];
+    const fields = keys.flatMap((each) => [...this.element.querySelectorAll<HTMLElement>(`[data-key="${CSS.escape(each)}"]`)]);
+    for (const field of owner === "domain" ? fields : fields.slice(0, 1)) field.setAttribute("aria-invalid", "true");
   }
 
   private async attempt(key: string, work: () => Promise<void>): Promise<void> {

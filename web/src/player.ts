@@ -1,6 +1,6 @@
 // Animation of a design along its computed path, with amplification and colours.
 
-import { isInSpace, post, type Motion, type Point, type Problem, type ToleranceFound } from "./api";
+import { isInSpace, isTurning, post, type Motion, type Point, type Problem, type ToleranceFound } from "./api";
 import { bitsOf } from "./api";
 import { binned, BINS, Drawing, markRegions, sectionOf, where, type Group, type LatticeDrawing } from "./drawing";
 import { loadSpace } from "./loadspace";
@@ -300,7 +300,9 @@ export class Player {
     const efficiency = motion.efficiency[near] ?? null;
     const out = efficiency === null || motion.stroke === null ? "" : `${figure(this.part * motion.stroke * this.scale * efficiency, 2)} mm out`;
     const turned = motion.rotation[near];
-    const lines = [figure(efficiency, 3), `output / input motion, ${motion.model}`, stroke, out, turned == null ? "" : `output turned by ${figure(turned, 1)}°`, motion.snapped[near] ? "after a snap-through" : ""];
+    const turns = turned != null && isTurning(this.problem, this.loadCase || motion.cases[0]!);
+    const lines = turns ? [`${figure(turned, 1)}°`, `rotation of the output, ${motion.model}`, stroke, "", "", motion.snapped[near] ? "after a snap-through" : ""]
+      : [figure(efficiency, 3), `output / input motion, ${motion.model}`, stroke, out, turned == null ? "" : `output turned by ${figure(turned, 1)}°`, motion.snapped[near] ? "after a snap-through" : ""];
     if (this.readout.childElementCount !== 6) {
       clear(this.readout, h("strong"), h("span"), h("span"), h("span"), h("span"), h("span", { class: "alarm" }));
     }

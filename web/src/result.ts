@@ -39,6 +39,9 @@ const SPACE_BODY = { level: "solid", title: "3D solid", words: "the 3D solid, th
 /** Time between two questions after what is computed, milliseconds. */
 const SHARE_PERIOD = 2000;
 
+/** Growth of a share from which the time left is estimated. */
+const LEAST_SHARE = 0.05;
+
 /** Smallest part of the random prints that meet all items, with which a verdict is green. */
 const LEAST_YIELD = 0.9;
 
@@ -50,7 +53,7 @@ interface Grips { plate: boolean; screws: number; pad: boolean; output_pad: bool
 const gripsOf = new Map<string, Grips>();
 
 /** What was computed of a part. */
-interface Known { fems: Record<string, Fem | "running" | string>; tolerance: ToleranceFound | "running" | string | null; print: Print | "running" | string | null; shares: Record<string, number | null> }
+interface Known { fems: Record<string, Fem | "running" | string>; tolerance: ToleranceFound | "running" | string | null; print: Print | "running" | string | null; shares: Record<string, number | null>; /** The first share of each computation that was known, and when, milliseconds. */ began: Record<string, [number, number]> }
 /** What the server knows of a slow computation: its result, or the share that is done. */
 type Computation<Found> = { result: Found } | { share: number | null } | null;
 interface Computations { validation: Record<string, Computation<Fem>>; tolerance: Computation<ToleranceFound>; print: Computation<Print> }
@@ -124,7 +127,7 @@ export class Result {
   private get known(): Known {
     const key = JSON.stringify(this.part);
     let found = this.knownOf.get(key);
-    if (!found) { found = { fems: {}, tolerance: null, print: null, shares: {} }; this.knownOf.set(key, found); }
+    if (!found) { found = { fems: {}, tolerance: null, print: null, shares: {}, began: {} }; this.knownOf.set(key, found); }
     return found;
   }
 
@@ -165,16 +168,21 @@ export class Result {
       const found = await this.askComputations(false);
       const shareOf = (each: Computation<unknown> | undefined): number | null => each && "share" in each ? each.share : null;
       known.shares = { tolerance: shareOf(found?.tolerance), ...Object.fromEntries(Object.entries(found?.validation ?? {}).map(([level, each]) => [level, shareOf(each)])) };
+      for (const [name, share] of Object.entries(known.shares)) if (share !== null) known.began[name] ??= [share, Date.now()];
       this.showTable();
       this.showTolerance();
     }
     this.following = false;
   }
 
-  /** How much of a computation is done, at the end of a text that says that it runs. */
+  /** How much of a computation is done and how long it still takes, at the end of a text that says that it runs. */
   private shareText(name: string): string {
     const share = this.known.shares[name];
-    return share == null ? " …" : `, ${Math.round(100 * share)} % …`;
+    if (share === undefined) return " …";
+    if (share === null) return ", waiting for other computations …";
+    const [first, began] = this.known.began[name] ?? [share, 0];
+    const left = share - first < LEAST_SHARE ? "" : `, about ${duration(((1 - share) * (Date.now() - began)) / (share - first) / 1000)} left`;
+    return `, ${Math.round(100 * share)} %${left} …`;
   }
 
   /** The model of the printed body. */

@@ -8,7 +8,7 @@ import { loadSpace } from "./loadspace";
 import { announce, button, choice, clear, count, duration, figure, h } from "./dom";
 import { Result } from "./result";
 import { itemTable, otherObjective, verdictOf } from "./specification";
-import { runMessage, REMEDIES, sentence } from "./text";
+import { runMessage, REMEDIES, sentence, statusName } from "./text";
 
 export class RunPage {
   readonly element = h("div", { class: "page run" });
@@ -175,9 +175,9 @@ export class RunPage {
     const settings = run.settings;
     if (this.shownStatus !== `${run.status}${run.title}`) {
       this.shownStatus = `${run.status}${run.title}`;
-      clear(this.head, h("h1", {}, run.title), h("p", {}, h("span", { class: `status ${run.status}` }, run.status),
+      clear(this.head, h("h1", {}, run.title), h("p", {}, h("span", { class: `status ${run.status}` }, statusName(run.status)),
         run.status === "queued" && run.place > 0 ? `, ${count(run.place, "search", "searches")} ahead` : ""));
-      announce(`${run.title}: ${run.status}`);
+      announce(`${run.title}: ${statusName(run.status)}`);
       this.showControls(run);
       this.showSwitcher();
     }
@@ -192,10 +192,10 @@ export class RunPage {
     const specified = Boolean(this.run.problem.specification);
     const tried = this.update?.tried;
     const refined = this.update?.refined;
-    const refining = refined && `${count(refined.designs, "design")}, ${count(refined.geometries, "geometry", "geometries")}${refined.sheets ? `, ${count(refined.sheets, "check")} in the better model` : ""}`;
+    const refining = refined && `${count(refined.designs, "design")}, ${count(refined.geometries, "shape")} computed${refined.sheets ? `, ${count(refined.sheets, "check")} ${isInSpace(this.run.problem) ? "with deviations of the print" : "in the 2D solid"}` : ""}`;
     const phase = refined ? "refinement" : tried ? "verification" : "search";
     const phases = ["search", "verification", ...(specified ? ["refinement"] : [])];
-    const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${done.toLocaleString("en")} geometries`)]] : [
+    const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${count(done, "shape")} computed`)]] : [
       ...(running ? [["phase", `${phases.indexOf(phase) + 1} of ${phases.length}: ${phase}`]] as [string, string][] : []),
       [!specified ? "best so far" : this.hasObjective ? "largest objective of the search" : "largest margin of the search", this.bestText(run)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],

@@ -26,10 +26,10 @@ export class SearchBox {
     const { settings } = editor;
     const methods = editor.registries?.searches ?? [];
     const update = (changes: Partial<Settings>): void => { editor.settings = { ...editor.settings, ...changes }; this.refresh(); };
-    const whole = (key: "steps" | "chains" | "seed", label: string, least: number, most: number): HTMLElement => {
+    const whole = (key: "steps" | "chains" | "seed", label: string, least: number, most: number, help = ""): HTMLElement => {
       const input = number(settings[key], { min: least, max: most, step: 1 }, (value) => update({ [key]: Math.min(most, Math.max(least, Math.round(value))) }));
       input.dataset.key = key;
-      return field(label, input);
+      return field(label, input, "", help);
     };
     const effort = EFFORTS.find(([, , steps, chains]) => steps === settings.steps && chains === settings.chains)?.[0] ?? "";
     const method = select(methods.map(({ name, title }) => [name, title]), settings.method, (picked) => update({ method: picked }));
@@ -46,11 +46,12 @@ export class SearchBox {
         h("details", { ...(this.expanded ? { open: true } : {}), ontoggle: (event: Event) => { this.expanded = (event.target as HTMLDetailsElement).open; } },
           h("summary", { "data-key": "more" }, "Method, steps, seed"),
           field("Method", method, "", methods.find(({ name }) => name === settings.method)?.summary ?? ""),
-          h("div", { class: "row three" }, whole("steps", "Steps", 1, 2_000_000), whole("chains", "Chains", 1, 64), whole("seed", "Seed", 0, 2 ** 31))),
+          h("div", { class: "row three" }, whole("steps", "Steps", 1, 2_000_000, "of each chain"), whole("chains", "Chains", 1, 64, "searches side by side"), whole("seed", "Seed", 0, 2 ** 31, "another number, another search"))),
         editor.hasHandDesign && h("label", { class: "tick" }, this.fromHand(), "Begin with the design by hand"),
         h("button", { type: "button", class: "primary", "data-key": "begin", disabled: !editor.built?.problem || !!editor.fault || !settings.method || this.busy,
           onclick: () => void this.start() }, "Design it"),
         missing && h("p", { class: "note" }, "Supports, an input and an output are needed."),
+        editor.fault && h("p", { class: "fault" }, editor.fault.text),
         this.fault && h("p", { class: "fault", role: "alert" }, this.fault)));
   }
 

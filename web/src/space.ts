@@ -1,7 +1,7 @@
 // A lattice in space, or an extruded one, drawn by WebGL. A bundle of its own, loaded when it is needed.
 
 import {
-  AmbientLight, BoxGeometry, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight, EdgesGeometry, Float32BufferAttribute,
+  AmbientLight, BoxGeometry, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DirectionalLight, EdgesGeometry, Float32BufferAttribute, Fog,
   Group as Branch, IcosahedronGeometry, InstancedMesh, Line, LineBasicMaterial, LineSegments, Matrix4, Mesh, MeshLambertMaterial,
   OrthographicCamera, Scene, SphereGeometry, Vector3, WebGLRenderer, type BufferGeometry as Geometry, type Object3D,
 } from "three";
@@ -15,6 +15,8 @@ const [AZIMUTH, ELEVATION] = [24, 22];
 const VIEWS: [string, string, number, number][] = [["corner", "Corner", AZIMUTH, ELEVATION], ["front", "Front", 0, 0], ["side", "Side", 90, 0], ["top", "Top", 0, 90]];
 /** Half the height of the visible region over that of the part. */
 const MARGIN = 1.1;
+/** Distances from the camera, over half the size of a part, between which colours fade to that of the paper: what is far is paler. */
+const FADED = [3.2, 6.2] as const;
 const TURN = 15;
 /** Pixels from a node or a strut within which it is picked. */
 const REACH = { node: 16, beam: 9 };
@@ -31,6 +33,7 @@ export class SpaceDrawing implements LatticeDrawing {
   dimension: 2 | 3 = 3;
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
+  private readonly fog = new Fog(0);
   private readonly camera = new OrthographicCamera();
   private readonly controls: OrbitControls;
   private readonly light = new DirectionalLight(0xffffff, 2.1);
@@ -72,6 +75,7 @@ export class SpaceDrawing implements LatticeDrawing {
     this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: !isSlow, alpha: true });
     this.renderer.setPixelRatio(isSlow ? 1 : Math.min(2, devicePixelRatio));
     this.camera.up.set(0, 0, 1);
+    this.scene.fog = this.fog;
     this.scene.add(new AmbientLight(0xffffff, 1.5), this.light, this.extras, this.zones, this.traces);
     this.controls = new OrbitControls(this.camera, this.canvas);
     this.controls.enablePan = false;
@@ -399,6 +403,7 @@ export class SpaceDrawing implements LatticeDrawing {
   private render(): void {
     this.frame = 0;
     this.light.position.copy(this.camera.position).sub(this.controls.target).add(this.camera.up.clone().multiplyScalar(2 * this.radius));
+    Object.assign(this.fog, { color: this.colour("beam background"), near: FADED[0] * this.radius, far: FADED[1] * this.radius });
     this.renderer.render(this.scene, this.camera);
     this.drawAxes();
   }

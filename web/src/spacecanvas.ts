@@ -99,7 +99,7 @@ export class SpaceCanvas implements TaskDrawing {
     pick.id = "layer";
     pick.setAttribute("aria-label", "Layer of nodes");
     pick.dataset.key = "layer";
-    const all = h("button", { type: "button", class: "small", "data-key": "whole-layer", disabled: this.layer === "", onclick: () => this.pickLayer() }, "Add all nodes of the layer");
+    const all = h("button", { type: "button", class: "small", "data-key": "whole-layer", disabled: this.layer === "", onclick: () => this.pickLayer() }, "Add all free nodes of the layer");
     this.bar.replaceChildren(h("label", { for: "layer" }, "Nodes of"), pick, all);
   }
 
@@ -108,8 +108,11 @@ export class SpaceCanvas implements TaskDrawing {
   }
 
   private pickLayer(): void {
-    if (!this.picksNodes) return;
-    this.actions.nodes(this.pickable, true);
+    const { picksNodes, tool, view_: view } = this;
+    if (!picksNodes || !view) return;
+    // Single nodes of a layer may have another role already, such as an input amid an output.
+    const taken = new Set(tool === "loads" ? [] : [...view.held.flatMap(({ nodes }) => nodes), ...view.arrows.filter(({ target }) => target.kind !== "loads").flatMap(({ nodes }) => nodes)]);
+    this.actions.nodes(this.pickable.filter((node) => !taken.has(node)), true);
   }
 
   private paint(): void {

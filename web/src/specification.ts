@@ -48,7 +48,7 @@ function mark(met: boolean): HTMLElement {
 }
 
 /** The model of the figures of a part. */
-export const FRAMES = "frames, 8 elements in each strut";
+export const FRAMES = "beams with rigid joints (frames), 8 elements in each strut";
 
 /** A column of figures: an output, in a model. */
 export interface FigureColumn { title: string; row: PartFigures }

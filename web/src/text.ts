@@ -49,6 +49,9 @@ export function faultText(message: string, place: (node: number) => string): str
   return sentence(key ? `${key.replaceAll("_", " ")}: ${rest}` : rest);
 }
 
+/** The status of a search in words. */
+export function statusName(status: string): string { return status === "stopped" ? "ended early, by Stop" : status; }
+
 /** Suggestions for a search that has found no good design. */
 export const REMEDIES = [
   "Refine the design (Next steps): nodes and widths change until the items are met in the printed outline, too.",

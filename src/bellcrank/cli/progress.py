@@ -80,7 +80,9 @@ class SearchProgress(Live):
             best = f"best objective {self._best_refined:.3f}"
             figures = best if math.isfinite(self._best_refined) else "no design meets all items yet"
             if step.sheets:
-                figures += f", design {number + 1} in the better model"
+                is_flat = self._problem.lattice.dimension == 2
+                model = "in the sheet" if is_flat else "with imperfections"
+                figures += f", design {number + 1} computed {model}"
             line = f"refining: {done} of at most {most} geometries, {figures}"
             self._show(done, most, figures, line)
 

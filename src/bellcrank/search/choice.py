@@ -71,9 +71,9 @@ class FirstWithoutFault:
             if each is not chosen
         ]
         others = self._others(chosen, verified, listed) if chosen.items else []
-        if _verification(chosen).fault is None:
-            return Chosen(chosen, refusals, [], others)
-        return Chosen(chosen, refusals, nearest(verified), others)
+        reserve = _further(finalists, [chosen, *others]) if chosen.items else []
+        near = [] if _verification(chosen).fault is None else nearest(verified)
+        return Chosen(chosen, refusals, near, others, reserve)
 
     def _verified(self, finalist: Finalist, done: int, total: int) -> Finalist:
         self.report(done, total)
@@ -107,6 +107,16 @@ class FirstWithoutFault:
                 own = [min(missed, key=_rank)]
             found += [each for each in own if each is not chosen]
         return sorted(found, key=lambda each: (*_rank(each), -each.response.score))
+
+
+def _further(finalists: Sequence[Finalist], taken: Sequence[Finalist]) -> list[Finalist]:
+    """Return at most `STARTS` finalists of each chain that differ from those taken, best first."""
+    found: list[Finalist] = []
+    for finalist in finalists:
+        same_chain = [each for each in found if each.found.chain == finalist.found.chain]
+        if len(same_chain) < STARTS and all(_differ(finalist, each) for each in [*taken, *found]):
+            found.append(finalist)
+    return found
 
 
 def _differ(first: Finalist, second: Finalist) -> bool:

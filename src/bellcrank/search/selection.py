@@ -101,6 +101,8 @@ class Chosen(NamedTuple):
     """The nearest ones to a specification that none meets."""
     others: Sequence[Finalist] = ()
     """For a problem with a specification: further ones that may be refined, the best first."""
+    reserve: Sequence[Finalist] = ()
+    """Those that are refined if no result of the others meets all items."""
 
 
 Choice: TypeAlias = "Callable[[Sequence[Finalist]], Chosen]"
@@ -132,6 +134,8 @@ class Selection:
         item.
     others
         For a problem with a specification: further designs that may be refined, the best first.
+    reserve
+        Designs that are refined if no result of the others meets all items; not verified.
     """
 
     design: Design
@@ -144,6 +148,7 @@ class Selection:
     items: tuple[ItemResult, ...] = ()
     nearest: tuple[Finalist, ...] = ()
     others: tuple[Finalist, ...] = ()
+    reserve: tuple[Finalist, ...] = ()
 
 
 def plateaus(
@@ -336,7 +341,7 @@ def select(
     if not finalists:
         raise NoDesignFound(_no_candidate(problem, len(candidates), refused, evaluator))
     finalists.sort(key=lambda each: each.response.score, reverse=True)
-    chosen, passed_over, nearest, others = choose(finalists)
+    chosen, passed_over, nearest, others, reserve = choose(finalists)
     best = chosen.response.score
     reasons = [reason for value, reason in (*refused, *passed_over) if value > best]
     return Selection(
@@ -350,6 +355,7 @@ def select(
         items=chosen.items,
         nearest=tuple(nearest),
         others=tuple(others),
+        reserve=tuple(reserve),
     )
 
 

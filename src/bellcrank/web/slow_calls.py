@@ -136,6 +136,8 @@ def _export(design: Design, spec: PartSpec, path: Path, grips: Grips) -> None:
 class ShareFile:
     """A file with the fraction of a computation that is done, for another process.
 
+    It is written when the computation begins.
+
     Parameters
     ----------
     path
@@ -144,7 +146,8 @@ class ShareFile:
 
     def __init__(self, path: str) -> None:
         self._path = path
-        self._written = 0.0
+        self._written = -LEAST_SHARE
+        self(0.0)
 
     def __call__(self, share: float) -> None:
         """Write the fraction, unless it has hardly changed."""

@@ -52,7 +52,8 @@ def refine_selection(
     """Refine designs of a search and select the best result.
 
     All are refined for a few geometries, and the best results further, as many as there are chains;
-    as many again if all of those miss items in the sheet only.
+    as many again if all of those miss items in the sheet only. If no result meets all items, those
+    of the reserve are refined in the same way.
 
     Parameters
     ----------
@@ -78,30 +79,24 @@ def refine_selection(
     """
     if not selection.design.problem.is_specified:
         return selection, None
-    finalists = [_finalist(selection), *selection.others]
-    chains = len({each.found.chain for each in finalists})
-    designs = [each.design for each in finalists]
-    designs = [replace(each, problem=with_joints(each.problem, each.mask)) for each in designs]
     workers, stop = workers or default_workers(), stop or threading.Event()
-    first = refine_designs(designs, None, report, workers, stop, FIRST)
-    if len(first) < len(designs):
-        return selection, None
-    order = sorted(range(len(first)), key=lambda number: _rank(first[number]), reverse=True)
-
+    finalists: list[Finalist] = []
     results: list[Refinement] = []
-    while len(results) < min(len(order), BATCHES * chains) and not _is_enough(results):
-        batch = order[len(results) : len(results) + chains]
+    before, groups = 0, ([_finalist(selection), *selection.others], [*selection.reserve])
+    for group in groups:
+        if not group or _is_met(results):
+            continue
 
-        def report_further(index: int, progress: Progress, batch: list[int] = batch) -> None:
-            evaluations = progress.evaluations + first[batch[index]].evaluations
-            report(batch[index], replace(progress, evaluations=evaluations))
+        def report_of_group(index: int, progress: Progress, before: int = before) -> None:
+            report(before + index, progress)
 
-        designs = [first[number].design for number in batch]
-        found = refine_designs(designs, spec, report_further, workers, stop)
-        if len(found) < len(batch):
+        before += len(group)
+
+        found = _refined(group, spec, report_of_group, workers, stop)
+        if not found:
             return selection, None
-        results += [_joined(first[n], each) for n, each in zip(batch, found, strict=True)]
-    finalists = [finalists[number] for number in order[: len(results)]]
+        finalists += [finalist for finalist, _ in found]
+        results += [result for _, result in found]
     best = max(range(len(results)), key=lambda number: _rank(results[number]))
     chosen = _verified(finalists[best], results[best].design)
     assert chosen.verification is not None
@@ -113,6 +108,37 @@ def refine_selection(
     ]
     near = nearest([_verified(finalist, design) for finalist, design in pairs])
     return _with_finalist(selection, chosen, near), results[best]
+
+
+def _refined(
+    finalists: Sequence[Finalist],
+    spec: PartSpec | None,
+    report: Callable[[int, Progress], None],
+    workers: int,
+    stop: threading.Event,
+) -> list[tuple[Finalist, Refinement]]:
+    """Refine finalists, the best of them further; return those, or nothing if it is stopped."""
+    chains = len({each.found.chain for each in finalists})
+    designs = [each.design for each in finalists]
+    designs = [replace(each, problem=with_joints(each.problem, each.mask)) for each in designs]
+    first = refine_designs(designs, None, report, workers, stop, FIRST)
+    if len(first) < len(designs):
+        return []
+    order = sorted(range(len(first)), key=lambda number: _rank(first[number]), reverse=True)
+    results: list[Refinement] = []
+    while len(results) < min(len(order), BATCHES * chains) and not _is_enough(results):
+        batch = order[len(results) : len(results) + chains]
+
+        def report_further(index: int, progress: Progress, batch: list[int] = batch) -> None:
+            evaluations = progress.evaluations + first[batch[index]].evaluations
+            report(batch[index], replace(progress, evaluations=evaluations))
+
+        designs = [first[number].design for number in batch]
+        found = refine_designs(designs, spec, report_further, workers, stop)
+        if len(found) < len(batch):
+            return []
+        results += [_joined(first[n], each) for n, each in zip(batch, found, strict=True)]
+    return [(finalists[number], each) for number, each in zip(order, results, strict=False)]
 
 
 def with_refined(selection: Selection, designs: Sequence[Design]) -> Selection:
@@ -140,9 +166,12 @@ def _is_enough(results: Sequence[Refinement]) -> bool:
 
     In space, with imperfections.
     """
+    return bool(results) and (_is_met(results) or not any(each.after.met for each in results))
+
+
+def _is_met(results: Sequence[Refinement]) -> bool:
+    """Whether a result meets all items, in the sheet too where it was computed."""
     met = [each for each in results if each.after.met]
-    if not met:
-        return bool(results)
     return any(not each.sheets or each.after.met_in_sheet for each in met)
 
 
