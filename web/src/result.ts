@@ -6,7 +6,7 @@ import { openTask } from "./begin";
 import { button, clear, count, download, duration, field, figure, h, number, select } from "./dom";
 import { where } from "./drawing";
 import { Player, type Picture } from "./player";
-import { figureColumns, figureTable, FRAMES, itemTable, otherObjective, verdictOf, type Column } from "./specification";
+import { figureTables, FRAMES, itemTable, otherObjective, verdictOf, type Column } from "./specification";
 import type { Table } from "./task";
 import { fileName, REMEDIES, sentence } from "./text";
 
@@ -250,7 +250,7 @@ export class Result {
     const models: [string, PartFigures[]][] = [["frames", report.figures]];
     if (solid?.figures) models.push([title, solid.figures]);
     const conditions = columns.length > 0 && h("p", { class: "note" }, `Items with ${report.conditions.join("; ")}.`);
-    clear(this.reportBox, columns.length > 0 && itemTable(columns), conditions, figureTable(figureColumns(models)));
+    clear(this.reportBox, columns.length > 0 && itemTable(columns), conditions, ...figureTables(models));
     const better = this.subject.comparison?.efficiency ?? null;
     const defect = unstable ? "The part has no stable path to the full stroke."
       : last && !isMet ? "The specification is not met."

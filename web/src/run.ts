@@ -22,6 +22,7 @@ export class RunPage {
   private readonly trouble = h("p", { class: "fault", role: "alert" });
   private readonly readout = h("div", { class: "readout" });
   private readonly watch: HTMLElement;
+  private readonly card: HTMLElement;
   private readonly side = h("div", { class: "side" });
   private readonly paper = h("div", { class: "paper" }, this.readout);
   private readonly switcher = h("div", { class: "bar" });
@@ -46,13 +47,13 @@ export class RunPage {
     this.chart.configure(run.settings);
     if (run.comparison) this.chart.compare(run.comparison.title, run.comparison.efficiency);
     this.stage.append(this.switcher, this.paper);
-    const card = h("section", { class: "card", "aria-label": "Progress of the search" }, this.curveTitle, this.chart.svg, this.curveNote);
+    this.card = h("section", { class: "card", "aria-label": "Progress of the search" }, this.curveTitle, this.chart.svg, this.curveNote);
     this.curveTitle.textContent = !run.problem.specification ? "Efficiency along the search" : `${this.hasObjective ? "Objective" : "Smallest margin of the items"} along the search, before refinement`;
-    card.hidden = run.refine;
+    this.card.hidden = run.refine;
     this.watch = h("aside", { class: "panel", "aria-label": "Search" },
       h("section", { class: "step open" }, h("h2", { class: "plain" }, "Search"), this.live, this.items, this.controls, this.trouble));
     this.side.append(this.watch);
-    this.element.append(this.head, h("div", { class: "main" }, this.stage, card), this.side);
+    this.element.append(this.head, h("div", { class: "main" }, this.stage, this.card), this.side);
     this.show(run);
     void this.openDrawing();
     if (run.mask) void this.open();
@@ -167,7 +168,8 @@ export class RunPage {
     });
     clear(this.stage, this.result.player.element);
     this.side.prepend(this.result.element);
-    this.element.querySelector(".main")!.append(this.watch);
+    // The drawing stays in view beside the result.
+    this.side.append(this.card, this.watch);
     this.show(whole);
   }
 

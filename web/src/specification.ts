@@ -61,6 +61,14 @@ export function figureColumns(models: [title: string, figures: PartFigures[]][])
   });
 }
 
+/** A table of figures for all outputs and models, or one for each output if there would be too many columns beside a drawing. */
+export function figureTables(models: [title: string, figures: PartFigures[]][]): HTMLElement[] {
+  const columns = figureColumns(models);
+  if (columns.length < 3) return [figureTable(columns)];
+  const outputs = [...new Set(columns.map(({ row }) => JSON.stringify([row.case, row.output])))];
+  return outputs.map((key) => figureTable(columns.filter(({ row }) => JSON.stringify([row.case, row.output]) === key)));
+}
+
 /** Motion, off-axis motion, rotation and load of each output, always beside each other. */
 export function figureTable(columns: FigureColumn[]): HTMLElement {
   const rows: [string, (row: PartFigures) => string, string?][] = [
