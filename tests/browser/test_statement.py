@@ -103,7 +103,7 @@ def test_nodes_that_lie_differently_after_a_change_of_size_are_named(page: Any) 
     fill(page, "Height", "80")
     until(page, lambda: task(page)["table"]["domain"]["size"][1] == 80)
     notice = page.locator(".notice")
-    notice.get_by_text("lie differently beside each other: output 1").wait_for()
+    notice.get_by_text("other nodes are selected: output 1").wait_for()
 
 
 def test_a_button_stays_under_the_pointer_when_the_panel_is_drawn_again(page: Any) -> None:

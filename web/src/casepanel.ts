@@ -69,7 +69,18 @@ export function casePanel(editor: TaskEditor, kind: "inputs" | "outputs" | "load
       : sections.length > 0 && button(`Add another ${noun}`, add, "quiet", { "data-key": `add-${kind}` }),
     !sections.length && h("p", { class: "note" }, `Click nodes in the drawing for the first ${noun}.`),
     kind === "loads" && gravity(editor),
+    kind === "outputs" && distanceText(editor),
     kind === "outputs" && caseTools(editor));
+}
+
+/** The distance between two outputs, as of the jaws of a gripper. */
+function distanceText({ built, loadCase, task: { table } }: TaskEditor): HTMLElement | null {
+  const [one, two, other] = built ? nodesOf(built, loadCase, "outputs") : [];
+  if (!built || !one?.length || !two?.length || other || isSpatial(table)) return null;
+  const { lattice: { positions }, part } = built;
+  const least = Math.min(...one.flatMap((a) => two.map((b) => Math.hypot(positions[a]![0] - positions[b]![0], positions[a]![1] - positions[b]![1]))));
+  const [distance, gap] = [least * part.scale, least * part.scale - part.width].map((each) => each.toFixed(1));
+  return h("p", { class: "note" }, `The nearest nodes of the outputs are ${distance} mm apart, with a gap of ${gap} mm between struts of ${part.width} mm.`);
 }
 
 /** A button that adds the mirror image of an input or output of a symmetric design, where it has none. */
@@ -272,8 +283,9 @@ function itemRow(key: string, name: string, { title, bound: usual, example, abou
       button("✕", () => put(null), "quiet small", { "data-key": `${key}-drop`, "aria-label": `Remove ${title}`, title: "Remove" })),
     isOffered && h("label", { class: "tick" }, maximise, "as large as possible"),
     MINIMISED.includes(name) && h("label", { class: "tick" }, minimise, "as small as possible"),
+    name === "blocked_force" && h("p", { class: "note" }, about),
     h("details", { ...(hasMore ? { open: true } : {}) }, h("summary", { "data-key": `${key}-more` }, "Other bounds"),
-      h("p", { class: "note" }, about),
+      name !== "blocked_force" && h("p", { class: "note" }, about),
       isOffered ? null : h("label", { class: "tick" }, maximise, "as large as possible"),
       h("div", { class: "row" }, ...extra.filter((other) => other !== bound).map((other) =>
         amount(`${key}-${other}`, labels[other]!, known[other] as Amount | undefined, "", (next) => change({ [other]: next } as Bounds))),

@@ -214,7 +214,7 @@ export class DomainPanel {
       const read = String(value ?? "").split(",").map(Number);
       if (read.length === given.length && read.every(Number.isFinite)) put({ ...shape, [key]: read });
     });
-    return h("div", { class: "row" }, numbers, key === "box" ? null : amount(`zone-${kind}-${index}-radius`, "Radius", shape.radius, "mm", (value) => put({ ...shape, radius: value ?? shape.radius! })));
+    return h("div", { class: "row numbers" }, numbers, key === "box" ? null : amount(`zone-${kind}-${index}-radius`, "Radius", shape.radius, "mm", (value) => put({ ...shape, radius: value ?? shape.radius! })));
   }
 
   private zones(): HTMLElement {
@@ -231,7 +231,7 @@ export class DomainPanel {
         choice("Kind of zone", ZONES, editor.zone.kind, (picked) => { editor.zone = { ...editor.zone, kind: picked }; }),
         choice("Shape of zone", [["box", "Box"], ["circle", "Circle"]] as [ZoneShape, string][], editor.zone.shape, (picked) => { editor.zone = { ...editor.zone, shape: picked }; editor.choose("zones"); }))
         : button("Draw holes and zones", () => editor.choose("zones"), "quiet", { "data-key": "zones" }),
-      ...known.map(({ kind, title, shape, index }) => h("p", { class: "zone-row" }, `${title}: ${shapeText(shape)} `,
+      ...known.map(({ kind, title, shape, index }) => h("div", { class: "zone-row" }, `${title}: ${shapeText(shape)} `,
         button("Remove", () => drop(kind, index), "quiet small", { "data-key": `zone-${kind}-${index}`, "aria-label": `Remove ${title.toLowerCase()} ${index + 1}` }),
         this.zoneFields(kind, index, shape))));
   }

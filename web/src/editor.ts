@@ -30,6 +30,12 @@ const IN_SPACE: Partial<Record<Tool, string>> = {
   outputs: "Click the nodes that must move; set their direction in the panel.",
   zones: "Add holes and zones in the panel, under Part, domain, files.",
 };
+/** Further hints for a symmetric design. */
+const MIRRORED: Partial<Record<Tool, string>> = {
+  supports: " The design is symmetric: a click selects the mirror image, too.",
+  inputs: " The design is symmetric: an input on the line of symmetry, or with an image, is changed with its mirror image.",
+  outputs: " The design is symmetric: an output on the line of symmetry, or with an image, is changed with its mirror image.",
+};
 const WELCOME = "This example is held at the bottom and pushed down at the right; its output must move left. Change it, or press Design it.";
 /** What a first node makes of a kind without any table. */
 const FIRST: Record<Kind, Record<string, unknown>> = {
@@ -89,7 +95,7 @@ export class Editor implements TaskEditor {
     this.welcome.hidden = !isFirstVisit;
     this.history = new History(task, storedHistory());
     this.canvas = new Canvas(this.actions);
-    this.paper = h("div", { class: "paper" }, this.readout, this.canvas.element);
+    this.paper = h("div", { class: "paper" }, this.readout, this.canvas.element, this.notice);
     this.solver = new Solver((result, latency) => this.showResponse(result, latency, result.error));
     this.panels = new Panels(this);
     this.layOut();
@@ -145,7 +151,7 @@ export class Editor implements TaskEditor {
       h("div", { class: "intro" },
         h("h1", {}, "Design a compliant mechanism"),
         h("p", {}, "State where the part is held, where it is pushed, and what its outputs must do. The search determines which struts to keep; the result is one piece that prints."),
-        this.panels.start, !this.welcome.hidden && this.welcome, this.notice),
+        this.panels.start, !this.welcome.hidden && this.welcome),
       stage, this.panels.element);
   }
 
@@ -362,14 +368,14 @@ export class Editor implements TaskEditor {
       for (const k of cases) nodesOf(now, k, kind).forEach((nodes, index) => {
         const old = nodesOf(former, k, kind)[index];
         if (!old || old.length < 2) return;
-        // An edge has other nodes in each lattice; nodes that were selected one by one stay as many.
-        const single = sectionsOf(this.task.table, k, kind)[index]?.at?.every((region) => region.point);
-        if (old.length !== nodes.length) { if (single) names.push(`${kind.slice(0, -1)} ${index + 1}`); return; }
+        // A whole edge or face has other nodes in each lattice.
+        const isWhole = sectionsOf(this.task.table, k, kind)[index]?.at?.every(({ edge, face, between }) => (edge || face) && !between);
+        if (old.length !== nodes.length) { if (!isWhole) names.push(`${kind.slice(0, -1)} ${index + 1} (${nodes.length} instead of ${count(old.length, "node")})`); return; }
         const [one, two] = [offsets(former, old), offsets(now, nodes)];
         if (one.some((place, j) => place.some((value, axis) => Math.abs(value - two[j]![axis]!) > 0.1))) names.push(`${kind.slice(0, -1)} ${index + 1}`);
       });
     }
-    const text = names.length ? `In the new lattice the nodes lie differently beside each other: ${names.join(", ")}. Check them in the drawing.` : "";
+    const text = names.length ? `In the new lattice other nodes are selected: ${names.join(", ")}. Check them in the drawing.` : "";
     clear(this.notice, text);
     if (text) announce(text);
   }
@@ -408,7 +414,8 @@ export class Editor implements TaskEditor {
   private show(): void {
     this.showDrawing();
     const inSpace = this.canvas instanceof SpaceCanvas;
-    this.hint.textContent = (inSpace && IN_SPACE[this.tool]) || TOOLS.find(([key]) => key === this.tool)![2];
+    const isMirrored = !inSpace && this.task.table.limits?.symmetry && MIRRORED[this.tool];
+    this.hint.textContent = ((inSpace && IN_SPACE[this.tool]) || TOOLS.find(([key]) => key === this.tool)![2]) + (isMirrored ? MIRRORED[this.tool]! : "");
     this.undoButton.disabled = !this.history.canUndo;
     this.redoButton.disabled = !this.history.canRedo;
     this.errorLine.textContent = this.fault?.text ?? "";

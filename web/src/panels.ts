@@ -158,7 +158,8 @@ export class Panels {
     const wanted = items.map((item) => ({ ...item, reached: "", margin: null, met: false }));
     clear(this.items, h("h2", { class: "plain" }, "Specification"),
       reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by this design.`),
-      itemTable(reached ? [{ title: "by hand", items: reached }] : [], wanted));
+      itemTable(reached ? [{ title: "by hand", items: reached }] : [], wanted),
+      !items.some(({ name }) => name.endsWith("strain")) && h("p", { class: "note" }, editor.task.table.limits?.strain === false ? "The strain is not limited." : "The strain is not limited, since no limit of the material is known: enter one under Limits and tolerance."));
   }
 
   private section(key: string, title: string, summary: string, make: () => HTMLElement): HTMLElement {

@@ -204,7 +204,6 @@ export class RunPage {
       ...(running && phase === "search" ? [["speed", this.update?.speed ? `${Math.round(this.update.speed).toLocaleString("en")} steps/s` : "starting …"], ["left of this phase", duration(this.update?.left)]] as [string, string][] : []),
       ...(running && tried && !refined ? [["candidates verified", `${tried[0]} of at most ${tried[1]}`]] as [string, string][] : []),
       ...(refining ? [["refinement", refining]] as [string, string][] : []),
-      ...(running && refined?.left != null ? [["left at most", duration(refined.left)]] as [string, string][] : []),
       ["method", `${this.method?.title ?? run.method}, ${count(settings.chains, "chain")}, seed ${settings.seed}`],
       ...(settings.goals.length ? [["constraints", settings.goals.join(", ")]] as [string, string][] : []),
     ];
@@ -226,7 +225,7 @@ export class RunPage {
       if (objective) this.curveTitle.textContent = `Objective along the search, before refinement: ${objective.label}${this.unit === 1 ? "" : ", mm"}`;
       else if (moved?.objectives.length) this.curveTitle.textContent = `Objective along the search, before refinement: ${moved.objectives[0]!.label}`;
       clear(this.readout, value !== null && h("strong", {}, objective?.reached ?? figure(value, 3)),
-        h("span", {}, `${objective ? `${objective.label} of the ` : ""}${this.stateText(run, value !== null, done)}`));
+        h("span", {}, `${value === null || run.status !== "running" ? "" : `${objective ? objective.label : "output / input motion"} of the `}${this.stateText(run, value !== null, done)}`));
     }
   }
 

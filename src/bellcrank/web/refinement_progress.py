@@ -40,7 +40,6 @@ class RefinementReporter:
         self._part, self._count, self._only_met = part, count, only_met
         self._latest: dict[int, RefinementProgress] = {}
         self._best: dict[int, RefinementProgress] = {}
-        self._began = 0.0
         self._sent: Design | None = None
         self._sent_at = 0.0
 
@@ -48,7 +47,6 @@ class RefinementReporter:
         """Record a geometry of the refinement of a design."""
         from bellcrank.refine.by_frames import MET
 
-        self._began = self._began or time.monotonic()
         self._latest[number] = progress
         self._count.add(number, progress.evaluations)
         if progress.rows.violation > MET:
@@ -68,8 +66,7 @@ class RefinementReporter:
     def summary(self) -> dict[str, Any] | None:
         """Return the numbers of designs, geometries and sheets, and the best objective.
 
-        The objective is that of the latest geometries that meet all items. ``left`` is the time in
-        seconds that all geometries would take; most refinements end before. None before the first.
+        The objective is that of the latest geometries that meet all items. None before the first.
         """
         from bellcrank.refine.by_frames import MET
 
@@ -77,14 +74,11 @@ class RefinementReporter:
         if not latest:
             return None
         met = [each.rows.objective for each in latest if each.rows.violation <= MET]
-        done, most = self._count.done, self._count.most
-        elapsed = time.monotonic() - self._began
         return {
             "designs": len(latest),
-            "geometries": done,
+            "geometries": self._count.done,
             "sheets": sum(each.sheets for each in latest),
-            "most": most,
-            "left": elapsed * max(most - done, 0) / done if done else None,
+            "most": self._count.most,
             "objective": float(max(met)) if met else None,
         }
 
