@@ -1,4 +1,4 @@
-"""Print the tests that were skipped, one in a line, as arguments for pytest.
+"""Print the tests that were skipped, one in a line, to be run by ``pytest @FILE``.
 
 ``pytest --junitxml=FILE`` writes the report; ``python tools/skipped_tests.py FILE`` reads it.
 """
@@ -11,7 +11,7 @@ from pathlib import Path
 
 
 def skipped(report: Path) -> list[str]:
-    """Return the tests of a report that were skipped; of a skipped module or folder its path."""
+    """Return the tests of a report that were skipped; of a skipped module its path."""
     found: dict[str, None] = {}
     for case in ET.parse(report).iter("testcase"):
         if case.find("skipped") is not None:
@@ -23,12 +23,11 @@ def skipped(report: Path) -> list[str]:
 
 
 def _node(parts: list[str]) -> list[str]:
-    """Return the path of a file or folder and the names inside of it."""
+    """Return the path of a file and the names inside of it."""
     for count in range(len(parts), 0, -1):
-        folder = Path(*parts[:count])
-        for path in (folder.with_suffix(".py"), folder):
-            if path.exists():
-                return [path.as_posix(), *parts[count:]]
+        path = Path(*parts[:count]).with_suffix(".py")
+        if path.is_file():
+            return [path.as_posix(), *parts[count:]]
     raise SystemExit(f"no file of {'.'.join(parts)}")
 
 

@@ -9,6 +9,9 @@ import pytest
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe")
 
+from bellcrank.model import problem_to_dict  # noqa: E402
+from bellcrank.task import find_task  # noqa: E402
+
 from .driving import section, summary, task, tool, until  # noqa: E402
 
 if TYPE_CHECKING:
@@ -92,6 +95,36 @@ def test_a_task_in_space_is_stated_by_layers_nodes_and_keys(page: Any) -> None:
     page.locator(".space canvas").wait_for()
     until(page, lambda: summary(page, "supports").endswith("nodes"))
     assert task(page)["table"]["domain"]["size"] == [45, 17, 45]
+
+
+def test_an_output_turns_about_the_middle_node_of_an_input(page: Any, server: Server) -> None:
+    begin(page, "twist-column")
+    until(
+        page, lambda: (summary(page, "inputs"), summary(page, "outputs")) == ("1 node", "6 nodes")
+    )
+    tool(page, "Outputs")
+    page.get_by_text("turns", exact=True).click()
+    tool(page, "Inputs")
+    layer, free = page.get_by_label("Layer of nodes"), page.locator('[data-key="whole-layer"]')
+    layer.select_option(str(layer.locator("option").count() - 2))  # the highest layer
+    free.click()  # all of its nodes have a role
+    layer.select_option("3")
+    free.click()
+    until(page, lambda: int(summary(page, "inputs").split()[0]) > 2)
+    assert summary(page, "outputs") == "6 nodes"
+    page.get_by_role("button", name="Keep its middle node only").click()
+    until(page, lambda: summary(page, "inputs") == "1 node")
+
+    task_of_turn = find_task("twist-column")
+    assert task_of_turn is not None
+    problem = problem_to_dict(task_of_turn.problem)
+    body = {"problem": problem, "mask": problem["initial"], "title": "turns"}
+    kept = page.request.post(f"{server.address}/api/gallery", data=body).json()
+    page.goto(f"{server.address}/#/design/{kept['source']}/{kept['key']}")
+    page.locator('.player[data-ready="yes"]').wait_for()
+    readout = page.locator(".player .readout")
+    readout.get_by_text("rotation of the output").wait_for()
+    assert readout.locator("strong").inner_text().endswith("°")
 
 
 def test_a_design_in_space_is_drawn_by_hand(page: Any) -> None:

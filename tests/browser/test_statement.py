@@ -135,6 +135,30 @@ def test_errors_name_the_sections_of_the_page(page: Any) -> None:
     assert text.startswith("Output 1, off axis, at most: expected at most 2")
     assert not re.search(r"cases\[|outputs\[", text)
     assert "without errors" in page.locator(".specification").inner_text()
+    wrong = page.locator('[data-key="outputs-0-off_axis-0"][aria-invalid="true"]')
+    assert wrong.count() == page.locator("[aria-invalid]").count() == 1
+    assert page.locator(".search .fault").inner_text() == text
+    page.keyboard.press("Control+z")
+    page.locator("[aria-invalid]").wait_for(state="detached")
+
+
+def test_what_follows_from_a_gripper_of_another_size_and_material_is_said(page: Any) -> None:
+    page.get_by_label("Start from").select_option("gripper")
+    until(page, lambda: summary(page, "inputs") == "3 nodes")
+    notice = page.locator(".notice")
+    assert notice.inner_text() == ""  # another task is no change of a lattice
+    tool(page, "Supports")
+    assert "selects the mirror image" in page.locator(".hint").inner_text()
+    tool(page, "Outputs")
+    page.get_by_text("40.0 mm apart, with a gap of 38.0 mm").wait_for()
+    unlimited = page.locator(".specification").get_by_text("The strain is not limited")
+    assert unlimited.count() == 0
+    section(page, "domain")
+    page.locator('[data-key="part-material"]').select_option(label="TPU 95A")
+    unlimited.wait_for()
+    page.locator('[data-key="part-spacing"]').fill("11.5")
+    page.keyboard.press("Tab")
+    notice.get_by_text("input 1 (1 instead of 3 nodes)").wait_for()
 
 
 def test_the_welcome_is_hidden_after_a_change_and_the_effort_is_kept(page: Any) -> None:

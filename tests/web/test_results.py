@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from bellcrank.web.results import Results, StoredResults
+from bellcrank.web.slow_calls import ShareFile
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -85,6 +86,15 @@ def test_a_stored_result_outlasts_the_server(tmp_path: Path) -> None:
         assert len(calls) == 1
 
     asyncio.run(run())
+
+
+def test_the_share_of_a_computation_is_0_when_it_begins(tmp_path: Path) -> None:
+    """Without a share, it waits for others."""
+    path = tmp_path / "crane.share"
+    write = ShareFile(str(path))
+    assert float(path.read_text()) == 0.0
+    write(0.5)
+    assert float(path.read_text()) == 0.5
 
 
 def test_a_running_computation_has_the_share_that_it_writes(tmp_path: Path) -> None:

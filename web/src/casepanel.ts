@@ -12,7 +12,7 @@ import {
 type Bound = "at_least" | "at_most" | "value" | "target";
 
 /** What a single value of a quantity bounds, an example, and what the quantity is. */
-interface Usual { title: string; bound: Bound; example: string; about: string; /** Unit of a bare number. */ unit?: string }
+interface Usual { title: string; bound: Bound; example: string; about: string; /** Unit of a bare number. */ unit?: string; /** Whether `about` is always shown. */ isExplained?: boolean }
 
 const USUAL: Record<QuantityName, Usual> = {
   gain: { title: "motion gain", bound: "at_least", example: "2", about: "Motion of the output along its direction, over the stroke of the input." },
@@ -22,7 +22,7 @@ const USUAL: Record<QuantityName, Usual> = {
   payload: { title: "payload", unit: "N", bound: "at_least", example: "10 g", about: "Load against the direction of the output that grows with the input, as that of a workpiece, and halves the travel. With a force of the tool Loads all items hold under it." },
   dead_load: { title: "dead load", unit: "N", bound: "at_least", example: "10 g", about: "Weight against the direction of the output that acts before the input, and halves the travel." },
   stiffness: { title: "stiffness", unit: "N/mm", bound: "at_least", example: "0.1 N/mm", about: "Stiffness of the output along its direction at the full stroke." },
-  blocked_force: { title: "blocked force", unit: "N", bound: "at_least", example: "0.1 N", about: "Force of the output at full stroke on a stop where it rests. To hold an object: ask for the travel up to it, and for this force." },
+  blocked_force: { title: "blocked force", unit: "N", bound: "at_least", example: "0.1 N", about: "Force of the output at full stroke on a stop where it rests. To hold an object: ask for the travel up to it, and for this force.", isExplained: true },
   sag: { title: "sag under own weight", bound: "at_most", example: "10%", about: "Motion of the output by the own weight, over its travel." },
 };
 
@@ -250,7 +250,7 @@ function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HT
 }
 
 /** What is wanted of a quantity: one bound, whether it is maximised, and everything else on demand. */
-function itemRow(key: string, name: string, { title, bound: usual, example, about, unit = "" }: Usual, bounds: Bounds, put: (next: Bounds | null) => void): HTMLElement {
+function itemRow(key: string, name: string, { title, bound: usual, example, about, unit = "", isExplained }: Usual, bounds: Bounds, put: (next: Bounds | null) => void): HTMLElement {
   const isMaximised = bounds.maximise === true || bounds.value === "maximise";
   // Only a rotation has a single value that means a bound on both sides.
   const offered: [Bound, string][] = [["at_least", "at least"], ["at_most", "at most"], ["target", "equal to"]];
@@ -283,9 +283,9 @@ function itemRow(key: string, name: string, { title, bound: usual, example, abou
       button("✕", () => put(null), "quiet small", { "data-key": `${key}-drop`, "aria-label": `Remove ${title}`, title: "Remove" })),
     isOffered && h("label", { class: "tick" }, maximise, "as large as possible"),
     MINIMISED.includes(name) && h("label", { class: "tick" }, minimise, "as small as possible"),
-    name === "blocked_force" && h("p", { class: "note" }, about),
+    isExplained && h("p", { class: "note" }, about),
     h("details", { ...(hasMore ? { open: true } : {}) }, h("summary", { "data-key": `${key}-more` }, "Other bounds"),
-      name !== "blocked_force" && h("p", { class: "note" }, about),
+      !isExplained && h("p", { class: "note" }, about),
       isOffered ? null : h("label", { class: "tick" }, maximise, "as large as possible"),
       h("div", { class: "row" }, ...extra.filter((other) => other !== bound).map((other) =>
         amount(`${key}-${other}`, labels[other]!, known[other] as Amount | undefined, "", (next) => change({ [other]: next } as Bounds))),

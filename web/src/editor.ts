@@ -80,7 +80,7 @@ export class Editor implements TaskEditor {
   private rest = 0;
   private sent = "";
   /** Whether another task was opened since the latest one was built. */
-  private isOther = true;
+  private isOther = false;
   private readonly onLeave = (): void => this.store();
   private readonly onStorage = (event: StorageEvent): void => this.noteOtherTab(event);
   private readonly actions: CanvasActions = {
@@ -340,7 +340,7 @@ export class Editor implements TaskEditor {
       const { lattice } = this.built;
       const same = !before || (before.beams.length === lattice.beams.length && JSON.stringify(before.positions) === JSON.stringify(lattice.positions));
       if (former && !same && !this.isOther) this.nameMoved(former, this.built);
-      if (this.isOther) this.isOther = false;
+      this.isOther = false;
       if (this.task.hand && !(same && this.task.hand.length === hexOf(new Uint8Array(lattice.beams.length)).length)) {
         this.history.set({ ...this.task, hand: null }, true);
       }
@@ -414,8 +414,8 @@ export class Editor implements TaskEditor {
   private show(): void {
     this.showDrawing();
     const inSpace = this.canvas instanceof SpaceCanvas;
-    const isMirrored = !inSpace && this.task.table.limits?.symmetry && MIRRORED[this.tool];
-    this.hint.textContent = ((inSpace && IN_SPACE[this.tool]) || TOOLS.find(([key]) => key === this.tool)![2]) + (isMirrored ? MIRRORED[this.tool]! : "");
+    const mirrored = (!inSpace && this.task.table.limits?.symmetry && MIRRORED[this.tool]) || "";
+    this.hint.textContent = ((inSpace && IN_SPACE[this.tool]) || TOOLS.find(([key]) => key === this.tool)![2]) + mirrored;
     this.undoButton.disabled = !this.history.canUndo;
     this.redoButton.disabled = !this.history.canRedo;
     this.errorLine.textContent = this.fault?.text ?? "";

@@ -187,15 +187,21 @@ export class Panels {
     return missing && owner(missing) === key ? NEEDED[key] ?? "" : "";
   }
 
-  /** Mark the field that an error is about. */
+  /** Mark the fields that an error is about. */
   private markFault(): void {
+    for (const key of this.faultyFields()) this.element.querySelector(`[data-key="${CSS.escape(key)}"]`)?.setAttribute("aria-invalid", "true");
+  }
+
+  /** Keys of the fields that an error is about; none if it is not about a value, or that of another load case. */
+  private faultyFields(): string[] {
     const key = this.editor.fault?.key ?? "";
-    const [, kind, index, name] = /(supports|inputs|outputs|loads)\[(\d+)\]\.(\w+)/.exec(key) ?? [];
-    const [, owner, own] = /^(part|limits|tolerance|domain)\.(\w+)/.exec(key) ?? [];
-    const keys = kind ? [`${kind}-${index}-${name}-0`, `${kind}-${index}-${name}`, `${kind}-${index}-amount`]
-      : owner === "domain" ? ["domain-width", "domain-depth", "domain-height"] : owner ? [`${owner === "limits" ? "limit" : owner}-${own}`] : [];
-    const fields = keys.flatMap((each) => [...this.element.querySelectorAll<HTMLElement>(`[data-key="${CSS.escape(each)}"]`)]);
-    for (const field of owner === "domain" ? fields : fields.slice(0, 1)) field.setAttribute("aria-invalid", "true");
+    if (key.startsWith("domain.size")) return ["domain-width", "domain-depth", "domain-height"];
+    const [, owner, own] = /^(part|limits|tolerance)\.(\w+)/.exec(key) ?? [];
+    if (owner) return [`${owner === "limits" ? "limit" : owner}-${own}`];
+    const [, loadCase, kind, index, name, number] = /^cases\[(\d+)\]\.(inputs|outputs|loads)\[(\d+)\]\.(\w+)(?:\[(\d+)\])?/.exec(key) ?? [];
+    if (Number(loadCase) !== this.editor.loadCase) return [];
+    const field = name === "direction" ? "angle" : kind === "outputs" ? (name === "spring" ? name : `${name}-${number ?? 0}`) : "amount";
+    return name === "at" || name === "during" ? [] : [`${kind}-${index}-${field}`];
   }
 
   private async attempt(key: string, work: () => Promise<void>): Promise<void> {

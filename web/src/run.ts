@@ -261,7 +261,7 @@ export class RunPage {
   }
 
   private stateText(run: Run, known: boolean, done: number): string {
-    if (run.status !== "running") return run.status;
+    if (run.status !== "running") return statusName(run.status);
     if (known) return `best ${this.update?.moved?.problem ? "refined design" : "design"} so far, ${modelOf(this.run.problem)}`;
     return done ? "No admissible design yet." : "Starting …";
   }

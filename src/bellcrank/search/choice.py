@@ -70,8 +70,10 @@ class FirstWithoutFault:
             for each in verified
             if each is not chosen
         ]
-        others = self._others(chosen, verified, listed) if chosen.items else []
-        reserve = _further(finalists, [chosen, *others]) if chosen.items else []
+        others, reserve = [], []
+        if chosen.items:
+            others = self._others(chosen, verified, listed)
+            reserve = _further(finalists, [chosen, *others])
         near = [] if _verification(chosen).fault is None else nearest(verified)
         return Chosen(chosen, refusals, near, others, reserve)
 

@@ -82,8 +82,8 @@ def refine_selection(
     workers, stop = workers or default_workers(), stop or threading.Event()
     finalists: list[Finalist] = []
     results: list[Refinement] = []
-    before, groups = 0, ([_finalist(selection), *selection.others], [*selection.reserve])
-    for group in groups:
+    before = 0
+    for group in ([_finalist(selection), *selection.others], selection.reserve):
         if not group or _is_met(results):
             continue
 
