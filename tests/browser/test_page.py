@@ -418,6 +418,19 @@ def test_a_result_that_is_left_ends_its_requests(page: Any, server: Server) -> N
     until(page, lambda: any(url.endswith("/tolerance") for url in ended))
 
 
+def test_a_computation_is_stopped_and_begun_again(page: Any, server: Server) -> None:
+    page.goto(f"{server.address}/#/design/builtin/human-crane")
+    page.locator(".figures.part").wait_for()
+    page.get_by_role("button", name="Compute the tolerance").click()
+    stop = page.get_by_role("button", name="Stop: Tolerance")
+    with page.expect_response(
+        lambda answer: answer.url.endswith("/api/tolerance") and answer.status == 409
+    ):
+        stop.click()
+    page.get_by_role("button", name="Compute the tolerance").wait_for()
+    assert stop.count() == 0
+
+
 def test_the_tolerance_of_a_design_is_shown_and_it_is_compared_with_another(
     page: Any, server: Server
 ) -> None:

@@ -42,6 +42,9 @@ def test_the_worst_value_is_the_nearest_to_violating_the_item() -> None:
     }  # fmt: skip
     assert item.worst["widths"].scenario.name == "widths 2"
     assert gain.worst["widths"].value == 4.5
+    assert not item.worst["widths"].met
+    assert item.worst["input"].met
+    assert gain.worst["widths"].met
     assert math.isnan(item.share)
     assert math.isnan(found.print_yield)
 
@@ -55,6 +58,7 @@ def test_yield_and_percentile_count_prints_that_lose_their_path() -> None:
     # One of 20 prints may be worse; the second worst has lost its path.
     assert math.isnan(item.percentile)
     assert math.isnan(item.worst["print"].value)
+    assert not found.rows()[1].worst["print"].met
     few = tolerance(("nominal", 0.05, 4.0), *[("print", 0.001 * k, 5.0) for k in range(100)])
     assert few.rows()[0].percentile == pytest.approx(0.094)
     assert few.print_yield == 1.0

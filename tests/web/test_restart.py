@@ -23,6 +23,7 @@ from .conftest import wait_for  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from concurrent.futures import Future
 
 pytestmark = pytest.mark.slow
 
@@ -167,6 +168,38 @@ def test_a_computation_ends_with_its_server_without_a_traceback(tmp_path: Path, 
             wait_for(lambda: client.post("/api/computations", json=asked).json()["tolerance"])
         assert answer.result(60).status_code == 503
     assert "Traceback" not in messages[0]
+
+
+def test_a_computation_that_is_stopped_makes_room_for_another(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(2) as pool, serving(tmp_path) as client:
+        crane = client.get("/api/gallery/builtin/human-crane").json()
+
+        def asked(width: float) -> dict[str, Any]:
+            return {"problem": crane["problem"], "mask": crane["mask"], "part": {"width": width}}
+
+        def begin(width: float) -> Future[Any]:
+            address = f"{client.base_url}api/tolerance"
+            return pool.submit(httpx.post, address, json=asked(width), timeout=300)
+
+        def is_computed(width: float) -> bool:
+            body = {**asked(width), "results": False}
+            known = client.post("/api/computations", json=body).json()["tolerance"]
+            return known is not None and known["share"] is not None
+
+        def stop(width: float) -> bool:
+            body = {**asked(width), "computation": "tolerance"}
+            return bool(client.post("/api/computations/stop", json=body).json()["stopped"])
+
+        assert not stop(1.4)
+        first = begin(1.4)
+        wait_for(lambda: is_computed(1.4))
+        second = begin(1.5)
+        assert stop(1.4)
+        assert first.result(5).status_code == 409
+        wait_for(lambda: is_computed(1.5))
+        assert stop(1.5)
+        assert second.result(5).status_code == 409
+        assert client.post("/api/computations", json=asked(1.4)).json()["tolerance"] is None
 
 
 def test_a_check_is_found_again_after_a_restart(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from bellcrank.web.pools import Stopped
 from bellcrank.web.results import Results, StoredResults
 from bellcrank.web.slow_calls import ShareFile
 
@@ -47,6 +48,27 @@ def test_a_client_that_leaves_does_not_end_a_computation_of_another() -> None:
         await asyncio.sleep(0.01)
         first.cancel()
         assert await second == {"mass": 17.0}
+
+    asyncio.run(run())
+
+
+def test_a_computation_that_is_stopped_ends_for_all_who_wait_and_can_begin_again() -> None:
+    calls: list[str] = []
+
+    async def compute() -> dict[str, Any]:
+        calls.append("begun")
+        await asyncio.sleep(60.0 if len(calls) == 1 else 0.0)
+        return {"mass": 17.0}
+
+    async def run() -> None:
+        results = Results()
+        both = [asyncio.create_task(results.get("crane", compute)) for _ in range(2)]
+        await asyncio.sleep(0.01)
+        assert results.stop("crane")
+        assert not results.stop("crane")
+        for each in await asyncio.gather(*both, return_exceptions=True):
+            assert isinstance(each, Stopped)
+        assert await results.get("crane", compute) == {"mass": 17.0}
 
     asyncio.run(run())
 

@@ -1,6 +1,6 @@
 // The panel beside a design: its specification, figures, part, files and next steps.
 
-import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, post, session, type Collection, type Comparison, type ItemState, type Part, type PartFigures, type PartReport, type Point, type Problem, type Registries, type ServerError, type ToleranceFound } from "./api";
+import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, post, session, type Collection, type Comparison, type ItemState, type Part, type PartFigures, type PartReport, type Point, type Problem, type Registries, ServerError, type ToleranceFound } from "./api";
 import { compareAddress } from "./address";
 import { openTask } from "./begin";
 import { button, clear, count, download, duration, field, figure, h, number, select } from "./dom";
@@ -39,6 +39,8 @@ const SPACE_BODY = { level: "solid", title: "3D solid", words: "the 3D solid, th
 /** Time between two questions after what is computed, milliseconds. */
 const SHARE_PERIOD = 2000;
 
+/** Status of the answer to a computation that was stopped on request. */
+const STOPPED = 409;
 /** Growth of a share from which the time left is estimated. */
 const LEAST_SHARE = 0.05;
 
@@ -169,13 +171,16 @@ export class Result {
       const shareOf = (each: Computation<unknown> | undefined): number | null => each && "share" in each ? each.share : null;
       known.shares = { tolerance: shareOf(found?.tolerance), ...Object.fromEntries(Object.entries(found?.validation ?? {}).map(([level, each]) => [level, shareOf(each)])) };
       for (const [name, share] of Object.entries(known.shares)) if (share !== null) known.began[name] ??= [share, Date.now()];
-      this.showTable();
-      this.showTolerance();
+      // Only the texts change: buttons are not replaced while they are pressed.
+      for (const each of this.element.querySelectorAll<HTMLElement>("[data-share]")) each.textContent = this.shareText(each.dataset["share"]!);
     }
     this.following = false;
   }
 
-  /** How much of a computation is done and how long it still takes, at the end of a text that says that it runs. */
+  /** The text of what is done of a computation, kept up to date while it runs. */
+  private share(name: string): HTMLElement { return h("span", { "data-share": name }, this.shareText(name)); }
+
+  /** How much of a computation is done and how long it still takes. */
   private shareText(name: string): string {
     const share = this.known.shares[name];
     if (share === undefined) return " …";
@@ -243,10 +248,10 @@ export class Result {
     const isMet = last !== null && columns.every(({ items }) => items.every(({ met }) => met)) && !unstable;
     const isSure = solid?.items && this.hasYield;
     this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? (isSure ? "met" : "met pending") : "missed"}`;
-    const pending = found === "running" ? `; ${words}, is being computed${this.shareText(level)}` : !solid ? `; not checked in ${words}` : !solid.items ? `; not stable in ${words}` : "";
+    const pending = found === "running" ? `; ${words}, is being computed` : !solid ? `; not checked in ${words}` : !solid.items ? `; not stable in ${words}` : "";
     const by = solid?.items ? ` by frames and in ${words}` : " by frames";
-    clear(this.verdict, unstable ? "The part snaps or collapses before the full stroke, by frames with 8 elements in each strut."
-      : last ? `${verdictOf(last)}${isMet || !solid?.items ? by : ` in ${words}`}${pending}${found === "running" ? "" : "."}${this.printedText()}` : "No specification: the task says nothing about straightness, rotation or load.");
+    clear(this.verdict, ...unstable ? ["The part snaps or collapses before the full stroke, by frames with 8 elements in each strut."]
+      : last ? [`${verdictOf(last)}${isMet || !solid?.items ? by : ` in ${words}`}${pending}`, found === "running" ? this.share(level) : ".", this.printedText()] : ["No specification: the task says nothing about straightness, rotation or load."]);
     const models: [string, PartFigures[]][] = [["frames", report.figures]];
     if (solid?.figures) models.push([title, solid.figures]);
     const conditions = columns.length > 0 && h("p", { class: "note" }, `Items with ${report.conditions.join("; ")}.`);
@@ -294,7 +299,7 @@ export class Result {
     if (known === undefined) {
       return h("tr", {}, heading, h("td", { colspan: 2 }, button("Check with finite elements", () => void this.validate(name), "quiet small", { "aria-label": `Check with finite elements: ${title}` }), h("span", { class: "more" }, ` ${duration}`)));
     }
-    if (known === "running") return h("tr", {}, heading, h("td", { colspan: 2, class: "more" }, h("span", { class: "working" }), `computing${this.shareText(name)}`));
+    if (known === "running") return h("tr", {}, heading, h("td", { colspan: 2, class: "more" }, h("span", { class: "working" }), "computing", this.share(name), " ", this.stopButton("validation", title, name)));
     if (typeof known === "string") return h("tr", {}, heading, h("td", { colspan: 2, class: "fault" }, known));
     const figures = [
       known.off_axis === null ? "" : `${figure(100 * known.off_axis, 0)} % off-axis`,
@@ -320,9 +325,19 @@ export class Result {
       known.fems[level] = found;
       if (show && found.picture) this.player.showStress(found.picture);
     } catch (error) {
-      known.fems[level] = sentence((error as ServerError).message);
+      if (wasStopped(error)) delete known.fems[level];
+      else known.fems[level] = sentence((error as ServerError).message);
     }
     this.showTable();
+  }
+
+  /** A button that stops a computation, here and in other windows. */
+  private stopButton(computation: "validation" | "tolerance", title: string, level = "frame"): HTMLElement {
+    const stop = async (): Promise<void> => {
+      const { problem, mask } = this.subject;
+      await post("/computations/stop", { problem, mask, part: this.part, computation, level }).catch((error: ServerError) => { this.trouble.textContent = sentence(error.message); });
+    };
+    return button("Stop", () => void stop(), "quiet small", { "aria-label": `Stop: ${title}`, "data-key": `stop ${computation} ${level}` });
   }
 
   private async computeTolerance(): Promise<void> {
@@ -335,7 +350,7 @@ export class Result {
       known.tolerance = await post<ToleranceFound>("/tolerance", { problem, mask, part: this.part }, this.requests.signal);
       this.player.showLosses(known.tolerance.losses);
     } catch (error) {
-      known.tolerance = sentence((error as ServerError).message);
+      known.tolerance = wasStopped(error) ? null : sentence((error as ServerError).message);
     }
     this.showTolerance();
     this.showTable();
@@ -349,7 +364,7 @@ export class Result {
         button("Compute the tolerance", () => void this.computeTolerance(), "", { "data-key": "tolerance" }), h("span", { class: "more" }, " ten seconds to some minutes"));
       return;
     }
-    if (tolerance === "running") { clear(this.toleranceBox, h("p", { class: "more" }, h("span", { class: "working" }), `computing${this.shareText("tolerance")}`)); return; }
+    if (tolerance === "running") { clear(this.toleranceBox, h("p", { class: "more" }, h("span", { class: "working" }), "computing", this.share("tolerance"), " ", this.stopButton("tolerance", "Tolerance"))); return; }
     if (typeof tolerance === "string") { clear(this.toleranceBox, h("p", { class: "fault", role: "alert" }, tolerance)); return; }
     const [head, ...rows] = tolerance.rows;
     // The panel is narrow: the worst values of each item are a line below it.
@@ -621,6 +636,9 @@ export class Result {
     }
   }
 }
+
+/** Whether a computation was stopped on request. */
+function wasStopped(error: unknown): boolean { return error instanceof ServerError && error.status === STOPPED; }
 
 /** The part of a design; that of 2 mm struts if none is recorded. */
 export function partOf(subject: Pick<Subject, "part" | "provenance">): Part {

@@ -22,10 +22,14 @@ PERCENTILE = 0.05
 
 
 class Worst(NamedTuple):
-    """The worst value of a quantity, nan if the full stroke is not reached, and its scenario."""
+    """The worst value of a quantity, its scenario, and whether the item is met there.
+
+    The value is nan if the full stroke is not reached. An objective is met where it is reached.
+    """
 
     value: float
     scenario: Scenario
+    met: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,7 +134,8 @@ class Tolerance:
         worst: dict[Kind, Worst] = {}
         for kind in self.kinds:
             chosen = max(self.of_kind(kind), key=lambda k: ranks[k])
-            worst[kind] = Worst(values[chosen], self.scenarios[chosen])
+            is_met = not math.isnan(values[chosen]) if met is None else met[chosen]
+            worst[kind] = Worst(values[chosen], self.scenarios[chosen], is_met)
         prints = sorted(self.of_kind("print"), key=lambda k: -ranks[k])
         percentile = share = math.nan
         if prints:

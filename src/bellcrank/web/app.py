@@ -24,7 +24,7 @@ from bellcrank.web.errors import plain_error
 from bellcrank.web.gallery import BundledDesigns, Gallery, RunDesigns, SavedDesigns
 from bellcrank.web.jobs import Jobs
 from bellcrank.web.machine_gallery import Actuators, Machines, Struts
-from bellcrank.web.pools import Busy, ServerEnds, TimeLimitExceeded, make_pools
+from bellcrank.web.pools import Busy, ServerEnds, Stopped, TimeLimitExceeded, make_pools
 from bellcrank.web.registries import registered
 from bellcrank.web.requests import ErrorResponse
 from bellcrank.web.results import StoredResults
@@ -44,7 +44,7 @@ PAGES = {
     "/icon.svg": ("icon.svg", "image/svg+xml"),
 }
 ERROR_RESPONSES: dict[int | str, dict[str, Any]] = {
-    code: {"model": ErrorResponse} for code in (400, 401, 403, 404, 413, 415, 422, 503, 507)
+    code: {"model": ErrorResponse} for code in (400, 401, 403, 404, 409, 413, 415, 422, 503, 507)
 }
 
 
@@ -181,6 +181,7 @@ def _status(error: Exception) -> int:
     kinds: tuple[tuple[type[Exception], int], ...] = (
         (Busy, 503),
         (ServerEnds, 503),
+        (Stopped, 409),
         (TimeLimitExceeded, 503),
         (UnknownName, 404),
         (StorageError, 507),

@@ -30,6 +30,7 @@ from bellcrank.web.requests import (
     PartBody,
     PlanBody,
     SaveDesignBody,
+    StopBody,
 )
 from bellcrank.web.state import State
 from bellcrank.web.task_files import problem_of
@@ -157,6 +158,16 @@ async def list_computations(body: ComputationsBody, state: State) -> dict[str, A
         }
 
     return await run_in_threadpool(read)
+
+
+@router.post("/computations/stop")
+async def stop_computation(body: StopBody, state: State) -> dict[str, bool]:
+    """Stop a slow computation on a part, for all who wait for it; return whether it was running."""
+    if body.computation == "tolerance":
+        key = _slow_key(slow_calls.tolerance, body)
+    else:
+        key = _slow_key(slow_calls.validation, body, body.level)
+    return {"stopped": state.stored.stop(key)}
 
 
 @router.post("/files/{suffix}", response_class=Response)

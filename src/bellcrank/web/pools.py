@@ -36,6 +36,10 @@ class ServerEnds(RunFailed):
     """The server ends before a computation."""
 
 
+class Stopped(RunFailed):
+    """A computation was stopped on request."""
+
+
 class TimeLimitExceeded(RunFailed):
     """A computation was ended by its time limit or by the operating system."""
 
@@ -58,6 +62,7 @@ def _initialize(niceness: int, lifeline: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server stops its processes itself
     if hasattr(os, "nice"):
         os.nice(niceness)
+    lifeline.send(os.getpid())
     threading.Thread(target=_exit_on_close, args=(lifeline,), daemon=True).start()
 
 
@@ -73,54 +78,58 @@ def _exit_on_close(lifeline: Connection) -> None:
 
 
 class Pool:
-    """Processes that are started at the first call and replaced when they die.
+    """A process that is started at the first call and replaced when it dies.
+
+    Calls are carried out one after the other.
 
     Parameters
     ----------
-    processes
-        Number of processes.
     seconds
         Time limit of a call; 0 for none.
     waiting
-        Largest number of accepted calls, including running ones.
+        Largest number of accepted calls, including the running one.
     niceness
-        Niceness of the processes.
+        Niceness of the process.
     recycle
-        Number of calls after which a process is replaced to release its memory.
+        Number of calls after which the process is replaced to release its memory.
+    stoppable
+        Whether the process is ended when its call is cancelled. Compiled code cannot be
+        interrupted in another way.
     """
 
     def __init__(
         self,
-        processes: int,
         seconds: int,
         waiting: int,
         niceness: int = 0,
         recycle: int | None = None,
+        *,
+        stoppable: bool = False,
     ) -> None:
-        self.processes, self.seconds, self.most = processes, seconds, waiting
-        self._niceness, self._recycle = niceness, recycle
+        self.seconds, self.most = seconds, waiting
+        self._niceness, self._recycle, self._stoppable = niceness, recycle, stoppable
         self._taken = 0
         self._ended = False
+        self._turn = asyncio.Lock()
         self._executor: ProcessPoolExecutor | None = None
         self._lifeline: Connection | None = None
 
     async def prepare(self) -> None:
-        """Start the processes and load or compile the kernels.
+        """Start the process and load or compile the kernels.
 
         Compilation may take minutes on a slow machine. A process that dies meanwhile is replaced
         once; kernels that it had compiled stay in the cache.
         """
         for _ in range(2):
             executor = self._started()
-            tasks = [executor.submit(quick_calls.load_kernels) for _ in range(self.processes)]
             with contextlib.suppress(BrokenProcessPool):
-                await asyncio.gather(*map(asyncio.wrap_future, tasks))
+                await asyncio.wrap_future(executor.submit(quick_calls.load_kernels))
                 return
             self._drop(executor)
-        raise RunFailed("the solver does not start: its processes end at once; is memory short?")
+        raise RunFailed("the solver does not start: its process ends at once; is memory short?")
 
     async def call(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Call a function of a module in one of the processes.
+        """Call a function of a module in the process.
 
         Raises
         ------
@@ -137,28 +146,36 @@ class Pool:
             raise Busy("the server is busy with other requests; try again in a moment")
         self._taken += 1
         try:
-            executor = self._started()
-            submitted = executor.submit(limited, self.seconds, partial(function, *args, **kwargs))
-            return await asyncio.wrap_future(submitted)
+            async with self._turn:
+                return await self._call(partial(function, *args, **kwargs))
+        finally:
+            self._taken -= 1
+
+    async def _call(self, function: Callable[[], T]) -> T:
+        if self._ended:
+            raise ServerEnds(ENDS)
+        executor = self._started()
+        try:
+            return await asyncio.wrap_future(executor.submit(limited, self.seconds, function))
         except (BrokenProcessPool, asyncio.CancelledError) as error:
             if self._ended:
                 raise ServerEnds(ENDS) from None
             if isinstance(error, asyncio.CancelledError):
+                if self._stoppable:
+                    self._kill()
                 raise
             self._drop(executor)
             raise TimeLimitExceeded(
                 f"this took more than {self.seconds} s or too much memory and was ended; "
                 "try something smaller"
             ) from None
-        finally:
-            self._taken -= 1
 
     def _started(self) -> ProcessPoolExecutor:
         if self._executor is None:
             context = multiprocessing.get_context("spawn")
-            theirs, self._lifeline = context.Pipe(duplex=False)
+            theirs, self._lifeline = context.Pipe()
             self._executor = ProcessPoolExecutor(
-                self.processes,
+                1,
                 mp_context=context,
                 initializer=_initialize,
                 initargs=(self._niceness, theirs),
@@ -167,12 +184,23 @@ class Pool:
         return self._executor
 
     def _drop(self, executor: ProcessPoolExecutor) -> None:
-        """Discard processes of which one has died; the next call starts new ones."""
+        """Discard a process that has died; the next call starts a new one."""
         if self._executor is executor:
             self._close()
 
+    def _kill(self) -> None:
+        """End the process; the next call starts a new one."""
+        assert self._lifeline is not None
+        latest = 0
+        while self._lifeline.poll():
+            latest = self._lifeline.recv()  # a process that was replaced has ended
+        self._close()
+        if latest:
+            with contextlib.suppress(OSError):
+                os.kill(latest, signal.SIGTERM)
+
     def end(self) -> None:
-        """End the processes, running and waiting calls, and accept no more calls."""
+        """End the process, the running and waiting calls, and accept no more calls."""
         self._ended = True
         self._close()
 
@@ -220,8 +248,8 @@ class Pools:
 def make_pools() -> Pools:
     """Return the pools of a server, without starting processes."""
     return Pools(
-        quick=Pool(1, seconds=120, waiting=64),
-        thorough=Pool(1, seconds=120, waiting=32, niceness=2),
-        files=Pool(1, seconds=1800, waiting=12, niceness=3, recycle=40),
-        checks=Pool(1, seconds=1800, waiting=12, niceness=5, recycle=40),
+        quick=Pool(seconds=120, waiting=64),
+        thorough=Pool(seconds=120, waiting=32, niceness=2),
+        files=Pool(seconds=1800, waiting=12, niceness=3, recycle=40, stoppable=True),
+        checks=Pool(seconds=1800, waiting=12, niceness=5, recycle=40, stoppable=True),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -130,6 +130,13 @@ class ComputationsBody(PartBody):
     """A design whose slow computations are listed, with their results or without."""
 
     results: bool = True
+
+
+class StopBody(PartBody):
+    """A design of which the tolerance, or the finite elements of a level, are stopped."""
+
+    computation: Literal["validation", "tolerance"]
+    level: Level = "frame"
 
 
 class SaveDesignBody(DesignBody):

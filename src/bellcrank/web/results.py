@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import BellcrankError
 from bellcrank.model.storage import read_text, write_text
+from bellcrank.web.pools import Stopped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Hashable
@@ -50,7 +51,13 @@ class Results:
     async def get(
         self, key: Hashable, compute: Callable[[], Coroutine[Any, Any, dict[str, Any]]]
     ) -> dict[str, Any]:
-        """Return a result, computed if it is not known; failures are not kept."""
+        """Return a result, computed if it is not known; failures are not kept.
+
+        Raises
+        ------
+        Stopped
+            If the computation is stopped.
+        """
         task = self._known.get(key)
         if task is None:
             task = self._known[key] = asyncio.create_task(compute())
@@ -60,9 +67,17 @@ class Results:
         try:
             # A client that leaves does not end the computation, since others may wait for it.
             return await asyncio.shield(task)
+        except asyncio.CancelledError:
+            if task.cancelled():
+                raise Stopped("stopped on request") from None
+            raise
         except Exception:
             self._known.pop(key, None)
             raise
+
+    def stop(self, key: Hashable) -> bool:
+        """Stop a computation, for all who wait for its result; return whether it was running."""
+        return self.is_running(key) and self._known.pop(key).cancel()
 
     def is_running(self, key: Hashable) -> bool:
         """Whether a result is being computed."""
@@ -96,6 +111,11 @@ class StoredResults:
             Text that the result follows from.
         compute
             Function of a file into which the computation writes the fraction that is done.
+
+        Raises
+        ------
+        Stopped
+            If the computation is stopped.
         """
         return await self._results.get(key, lambda: self._computed(key, compute))
 
@@ -109,6 +129,10 @@ class StoredResults:
             return {"share": _share(self._path(key, "share"))}
         found = None if running else self._stored(key)
         return None if found is None else {"result": found}
+
+    def stop(self, key: str) -> bool:
+        """Stop a computation, for all who wait for its result; return whether it was running."""
+        return self._results.stop(key)
 
     async def _computed(
         self, key: str, compute: Callable[[Path], Coroutine[Any, Any, dict[str, Any]]]

@@ -45,6 +45,8 @@ WIDTH, NODE = 0.1, 0.1
 """Usual deviations of widths and of coordinates of nodes, mm."""
 LOST = "lost"
 """Text for a value in a scenario without a stable path to the full stroke."""
+MISSED = " *"
+"""End of a value that does not meet its item."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -271,7 +273,10 @@ def send_results(
 
 
 def tolerance_rows(report: ToleranceReport) -> list[list[str]]:
-    """Return the items and objectives as rows of texts, the first with the names of the columns."""
+    """Return the items and objectives as rows of texts, the first with the names of the columns.
+
+    A worst value that does not meet its item ends with `MISSED`.
+    """
     tolerance, problem = report.tolerance, report.design.problem
     units = units_of(problem, report.spec)
     kinds = [kind for kind in HEADINGS if kind in tolerance.kinds]
@@ -285,7 +290,8 @@ def tolerance_rows(report: ToleranceReport) -> list[list[str]]:
         def text(value: float, item: Item = item) -> str:
             return LOST if np.isnan(value) else number_text(item, shown_value(item, value), units)
 
-        found = [text(row.worst[kind].value) for kind in kinds]
+        worst = [row.worst[kind] for kind in kinds]
+        found = [text(each.value) + (MISSED if not each.met else "") for each in worst]
         cells = [item_label(item, problem), wanted, text(row.nominal), *found]
         if has_prints:
             share = "" if np.isnan(row.share) else f"{100.0 * row.share:.0f} %"
@@ -299,7 +305,7 @@ def tolerance_sentence(report: ToleranceReport) -> str:
     tolerance = report.tolerance
     sentence = (
         f"{len(tolerance.scenarios)} scenarios, by frames with one element in each strut; the "
-        "worst value of each kind"
+        "worst value of each kind, with * if it does not meet its item"
     )
     if prints := tolerance.of_kind("print"):
         met = sum(tolerance.results[number].met for number in prints)
