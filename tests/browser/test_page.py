@@ -438,7 +438,7 @@ def test_the_tolerance_of_a_design_is_shown_and_it_is_compared_with_another(
     page.locator(".figures.part").wait_for()
     page.get_by_role("button", name="Compute the tolerance").click()
     page.locator(".items.tolerance tbody tr").first.wait_for()
-    assert page.locator('.colour input[value="loss"]').is_checked()
+    page.locator(".colour label", has_text="Loss of struts").click()
     assert page.locator(".player .beam.effect-3").get_attribute("d")
     page.get_by_label("Fill the supports to a plate for clamping").check()
     page.locator('[data-key="screws"]').fill("2")

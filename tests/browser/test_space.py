@@ -107,7 +107,8 @@ def test_an_output_turns_about_the_middle_node_of_an_input(page: Any, server: Se
     tool(page, "Inputs")
     layer, free = page.get_by_label("Layer of nodes"), page.locator('[data-key="whole-layer"]')
     layer.select_option(str(layer.locator("option").count() - 2))  # the highest layer
-    free.click()  # all of its nodes have a role
+    free.click()
+    page.locator(".notice", has_text="All nodes of this layer belong to").wait_for()
     layer.select_option("3")
     free.click()
     until(page, lambda: int(summary(page, "inputs").split()[0]) > 2)

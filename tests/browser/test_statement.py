@@ -205,3 +205,11 @@ def test_the_best_design_so_far_is_opened_and_two_searches_have_two_names(page: 
     page.locator("h1", has_text="gripper (2)").wait_for()
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("button", name="Continue").wait_for()
+
+
+def test_a_load_without_a_unit_is_in_newtons(page: Any) -> None:
+    tool(page, "Outputs")
+    page.get_by_label("Ask for").select_option("payload")
+    fill(page, "payload", "0.05")
+    wanted = [{"at_least": "0.05 N"}]
+    until(page, lambda: task(page)["table"]["cases"][0]["outputs"][0].get("payload") == wanted)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,12 +16,14 @@ from bellcrank.export.slicer import has_slicer
 from bellcrank.mechanics import VERIFICATION_INCREMENT, model_evaluator
 from bellcrank.model import (
     Design,
+    Tolerances,
     gallery_design,
     human_design,
     pack_mask,
     problem_from_dict,
     problem_to_dict,
     unpack_mask,
+    write_design,
 )
 from bellcrank.part import PartSpec
 from bellcrank.search import SpecificationEvaluator
@@ -27,6 +31,9 @@ from bellcrank.search.symmetry import beam_images
 from bellcrank.task import find_task
 from bellcrank.web.page_files import page_files
 from bellcrank.web.requests import RunBody
+from bellcrank.web.run_routes import _validated
+from bellcrank.web.search_process import _reached
+from bellcrank.web.task_tables import table_in, task_of
 from bellcrank.workflows.fabricate import (
     Grips,
     bundle_of,
@@ -40,6 +47,8 @@ from .test_api import refusal
 from .test_tasks import SIZED, full_mask
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from starlette.testclient import TestClient
 
 
@@ -52,6 +61,7 @@ def status_of(client: TestClient, name: str) -> str:
     ("changes", "words"),
     [
         ({"refine": True}, "start: expected the design to be refined"),
+        ({"tolerant": True}, "tolerant: expected a refinement"),
         ({"start": "abc"}, "mask"),
     ],
 )
@@ -75,6 +85,32 @@ def test_a_design_without_a_specification_is_not_refined(
 def test_a_request_keeps_what_it_begins_with() -> None:
     body = RunBody(title="a", session="b", task={}, start="ff", refine=True)
     assert (body.start, body.refine) == ("ff", True)
+
+
+def test_a_design_is_refined_over_the_usual_tolerances_on_request() -> None:
+    task = task_of(table_in(SIZED))
+    mask = task.problem.full_design().mask_hex
+    body = RunBody(title="a", session="b", task=SIZED, start=mask, refine=True)
+    for tolerant, wanted in ((False, None), (True, Tolerances(node=0.1 / task.part.scale))):
+        problem, record = _validated(body.model_copy(update={"tolerant": tolerant}))
+        assert problem.specification is not None
+        assert problem.specification.tolerances == wanted
+        assert record.refine
+
+
+def test_a_result_has_what_was_maximised_in_the_list(tmp_path: Path) -> None:
+    table = json.loads(json.dumps(SIZED))
+    output = table["cases"][0]["outputs"][0]
+    output.pop("gain", None)
+    output["travel"] = [{"maximise": True}]
+    task = task_of(table_in(table))
+    design = replace(task.problem.full_design(), efficiency=0.25)
+    (tmp_path / "run").mkdir()
+    write_design(design, tmp_path / "run" / "design.json")
+    (tmp_path / "job.json").write_text(json.dumps({"part": task.part.to_dict()}))
+    found = _reached(tmp_path)
+    assert found["efficiency"] == 0.25
+    assert re.fullmatch(r"travel -?[\d.]+ mm", found["objective"])
 
 
 @pytest.mark.slow

@@ -32,6 +32,8 @@ export interface Specification {
   cases?: { name: string; input: Problem["input"]; outputs: Record<string, Problem["output"]> }[];
   items: Wanted[];
   maximise: Wanted[];
+  /** Deviations of random prints that are to meet all items. */
+  tolerances?: Record<string, number> | null;
 }
 
 /** A quantity of an output that is bounded or maximised. */
@@ -81,6 +83,8 @@ export interface PartReport {
   /** Inputs and loads in words. */
   conditions: string[];
   figures: PartFigures[];
+  /** What is wanted of random prints; null without tolerances. */
+  tolerance: { name: string; label: string; wanted: string; least_yield: number } | null;
 }
 
 /** A part over tolerances: rows of texts, and what the loss of each strut costs. */
@@ -122,6 +126,8 @@ export interface Run {
   status: "queued" | "running" | "paused" | "stopped" | "finished" | "failed";
   message: string;
   efficiency: number | null;
+  /** What the result was to maximise or minimise and its value, if that is not the efficiency. */
+  objective: string;
   method: string;
   settings: { steps: number; chains: number; seed: number; goals: string[]; hot?: number; cold?: number; replicas?: number };
   part: Part | null;

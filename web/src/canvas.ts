@@ -16,6 +16,7 @@ export interface CanvasActions {
   beams(beams: number[], merge: boolean): void;
   aim(target: Target, direction: Direction, stroke: number | null, merge: boolean): void;
   zone(shape: Shape): void;
+  note(text: string): void;
 }
 
 type Drag = { kind: "box" | "paint" | "aim" | "zone"; from: Point; arrow?: Arrow; add: boolean; done: Set<number>; moved: boolean };

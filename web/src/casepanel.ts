@@ -1,6 +1,6 @@
 // Inputs, outputs and loads of a load case.
 
-import { button, choice, field, h, select } from "./dom";
+import { button, choice, field, h, select, type Child } from "./dom";
 import { angleOf } from "./drawing";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
@@ -19,8 +19,8 @@ const USUAL: Record<QuantityName, Usual> = {
   travel: { title: "travel", unit: "mm", bound: "at_least", example: "5 mm", about: "Motion of the output along its direction." },
   off_axis: { title: "off-axis motion", bound: "at_most", example: "10%", about: "Largest motion normal to the direction, over the travel." },
   rotation: { title: "rotation", unit: "°", bound: "value", example: "5 deg", about: "Rotation of the output, counter-clockwise positive." },
-  payload: { title: "payload", unit: "N", bound: "at_least", example: "10 g", about: "Load against the direction of the output that grows with the input, as that of a workpiece, and halves the travel. With a force of the tool Loads all items hold under it." },
-  dead_load: { title: "dead load", unit: "N", bound: "at_least", example: "10 g", about: "Weight against the direction of the output that acts before the input, and halves the travel." },
+  payload: { title: "payload", unit: "N", bound: "at_least", example: "10 g", about: "Load against the direction of the output that grows with the input, as that of a workpiece, and halves the travel. To reach all items under a load, add a force in the step Loads.", isExplained: true },
+  dead_load: { title: "dead load", unit: "N", bound: "at_least", example: "10 g", about: "Weight against the direction of the output that acts before the input, and halves the travel.", isExplained: true },
   stiffness: { title: "stiffness", unit: "N/mm", bound: "at_least", example: "0.1 N/mm", about: "Stiffness of the output along its direction at the full stroke." },
   blocked_force: { title: "blocked force", unit: "N", bound: "at_least", example: "0.1 N", about: "Force of the output at full stroke on a stop where it rests. To hold an object: ask for the travel up to it, and for this force.", isExplained: true },
   sag: { title: "sag under own weight", bound: "at_most", example: "10%", about: "Motion of the output by the own weight, over its travel." },
@@ -59,6 +59,7 @@ export function casePanel(editor: TaskEditor, kind: "inputs" | "outputs" | "load
       ...make(editor, each as never, target),
       kind !== "loads" && imageButton(editor, kind, target),
       kind === "inputs" && middleButton(editor, target),
+      kind === "inputs" && nodes > 1 && h("p", { class: "note" }, "All its nodes move along its direction only: they cannot turn or move sideways."),
       h("div", { class: "row between" },
         button("Clear nodes", () => editor.change(withSection(editor.task.table, editor.loadCase, target, { at: [] })), "quiet small", { disabled: !nodes, "data-key": `clear-${kind}-${index}` }),
         (sections.length > 1 || kind === "loads") && button(`Remove ${noun} ${index + 1}`, drop, "quiet small", { "data-key": `drop-${kind}-${index}` })));
@@ -222,7 +223,7 @@ function nameField(editor: TaskEditor, own: CaseTable): HTMLElement {
   return amount("case-name", "Name of the load case", own.name, "", (value) => changeCase(editor, { name: value === undefined ? undefined : String(value) }));
 }
 
-function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HTMLElement[] {
+function outputFields(editor: TaskEditor, each: OutputTable, target: Target): Child[] {
   const key = `outputs-${target.index}`;
   const several = sectionsOf(editor.task.table, editor.loadCase, "outputs").length > 1;
   const usual = (name: QuantityName): Usual => (name === "rotation" && isSpatial(editor.task.table) ? { ...USUAL[name], about: ROTATION_IN_SPACE } : USUAL[name]);
@@ -241,7 +242,10 @@ function outputFields(editor: TaskEditor, each: OutputTable, target: Target): HT
   return [
     ...(several ? [amount(`${key}-name`, "Name", each.name, "", (value) => set(editor, target, { name: value === undefined ? undefined : String(value) }))] : []),
     choice("Motion of the output", [["moves", "moves"], ["turns", "turns"]] as ["moves" | "turns", string][], turns ? "turns" : "moves", (picked) => set(editor, target, picked === "turns" ? TURN : MOTION), `motion-${target.index}`),
-    turns ? h("p", { class: "note" }, isSpatial(editor.task.table) ? ROTATION_IN_SPACE : "The mean rotation of its nodes counts: counter-clockwise is positive.") : directionFields(editor, target, each.direction),
+    turns && h("p", { class: "note" }, isSpatial(editor.task.table) ? ROTATION_IN_SPACE : "The mean rotation of its nodes counts: counter-clockwise is positive."),
+    // The direction of an output that turns matters for its off-axis motion alone.
+    (!turns || each.off_axis) && directionFields(editor, target, each.direction ?? "up"),
+    turns && each.off_axis && h("p", { class: "note" }, "Off-axis motion is the mean motion of its nodes normal to this direction, over that along it."),
     h("div", { class: "wanted" }, ...rows, each.path ? pathRow(editor, each, target) : null,
       h("div", { class: "ask" }, h("span", {}, "Ask for"), add)),
     h("details", { ...(each.spring !== undefined ? { open: true } : {}) }, h("summary", { "data-key": `${key}-workpiece` }, "Workpiece that resists"),
@@ -274,7 +278,9 @@ function itemRow(key: string, name: string, { title, bound: usual, example, abou
   const hasMore = extra.some((other) => other !== bound && known[other] !== undefined) || known.of !== undefined;
   const of = select([["", "every value"], ["largest", "the largest"], ["smallest", "the smallest"], ["spread", "the spread"]], known.of ?? "", (picked) => change({ of: picked || undefined } as Bounds));
   of.dataset.key = `${key}-of`;
-  const input = amount(key, "", value, typeof value === "string" ? "" : unit, (next) => change({ [bound]: next }), value === undefined && !isMaximised ? `such as ${example}` : "");
+  // A load is in N or g, so that its unit is written.
+  const own = (next: Amount | undefined): Amount | undefined => (typeof next === "number" && unit.startsWith("N") ? `${next} ${unit}` : next);
+  const input = amount(key, "", value, typeof value === "string" ? "" : unit, (next) => change({ [bound]: own(next) }), value === undefined && !isMaximised ? `such as ${example}` : "");
   input.querySelector("label")!.remove();
   input.querySelector("input")!.setAttribute("aria-label", title);
   return h("div", { class: "item", "data-item": name },
@@ -288,7 +294,7 @@ function itemRow(key: string, name: string, { title, bound: usual, example, abou
       !isExplained && h("p", { class: "note" }, about),
       isOffered ? null : h("label", { class: "tick" }, maximise, "as large as possible"),
       h("div", { class: "row" }, ...extra.filter((other) => other !== bound).map((other) =>
-        amount(`${key}-${other}`, labels[other]!, known[other] as Amount | undefined, "", (next) => change({ [other]: next } as Bounds))),
+        amount(`${key}-${other}`, labels[other]!, known[other] as Amount | undefined, "", (next) => change({ [other]: ["at_least", "at_most", "target"].includes(other) ? own(next) : next } as Bounds))),
       field("In the range, bounds", of))));
 }
 

@@ -1,6 +1,6 @@
 // Functions that create elements, format numbers and announce messages to screen readers.
 
-type Child = Node | string | number | null | undefined | false;
+export type Child = Node | string | number | null | undefined | false;
 type Props = Record<string, unknown>;
 
 const SVG = "http://www.w3.org/2000/svg";

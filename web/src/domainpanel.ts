@@ -77,8 +77,16 @@ export class DomainPanel {
       return built.part.scale * (Math.max(...values) - Math.min(...values));
     });
     // The struts extend by half of their width beyond the nodes.
-    if (lengths.every((length, axis) => length + built.part.width > 0.93 * size[axis]!)) return null;
-    return h("p", { class: "note" }, `The lattice fills ${lengths.map((length) => length.toFixed(1)).join(" × ")} mm of it: whole cells with nodes ${built.part.scale} mm apart.`);
+    const outer = lengths.map((length) => length + built.part.width);
+    if (outer.every((length, axis) => length > 0.93 * (size[axis] as number))) return null;
+    const spacings = size.map((length, axis) => Math.floor((10 * built.part.scale * ((length as number) - built.part.width)) / lengths[axis]!) / 10);
+    const fitting = Math.min(...spacings);
+    const larger = fitting > built.part.scale ? ` With nodes ${fitting} mm apart the same cells are as large as fit.` : "";
+    // Columns and rows of the triangular lattice.
+    const cells = [1, Math.sqrt(3) / 2];
+    const next = size.map((length, axis) => Math.ceil(10 * (outer[axis]! > 0.93 * (length as number) ? (length as number) : outer[axis]! + cells[axis]! * built.part.scale)) / 10);
+    const room = size.length === 2 ? ` ${next.join(" × ")} mm would hold more cells.` : "";
+    return h("p", { class: "note" }, `The part is ${outer.map((length) => length.toFixed(1)).join(" × ")} mm: whole cells with nodes ${built.part.scale} mm apart, and half a strut around them.${larger}${room}`);
   }
 
   private file(label: string, accept: string, use: (file: File) => void): HTMLInputElement {

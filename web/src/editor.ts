@@ -88,6 +88,7 @@ export class Editor implements TaskEditor {
     beams: (beams, merge) => this.paint(beams, merge),
     aim: (target, direction, stroke, merge) => this.aim(target, direction, stroke, merge),
     zone: (shape) => this.addZone(shape),
+    note: (text) => this.note(text),
   };
   private readonly keys = undoKeys((action) => this.step(action));
 
@@ -239,8 +240,7 @@ export class Editor implements TaskEditor {
     this.built = withRegion(now, loadCase, this.target, add ? [...new Set([...known, ...nodes])] : known.filter((node) => !gone.has(node)));
     this.set({ ...next, hand: null }, this.pairing);
     const text = taken.length ? `${sentence(`Taken over: ${taken.join(", ")}`)} A node belongs to one support, input or output.` : "";
-    clear(this.notice, text);
-    if (text) announce(text);
+    this.note(text);
     if (!this.pairing && (kind === "inputs" || kind === "outputs")) this.pickImages(symmetry, kind, index, before, nodes, add);
   }
 
@@ -376,6 +376,11 @@ export class Editor implements TaskEditor {
       });
     }
     const text = names.length ? `In the new lattice other nodes are selected: ${names.join(", ")}. Check them in the drawing.` : "";
+    this.note(text);
+  }
+
+  /** Show a notice in the drawing; an empty one removes it. */
+  private note(text: string): void {
     clear(this.notice, text);
     if (text) announce(text);
   }

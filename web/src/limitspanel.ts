@@ -7,7 +7,7 @@ import { cleaned, isSpatial, type Amount, type Limits, type Tolerance } from "./
 
 const SYMMETRIES: [string, string][] = [["", "none"], ["x", "left and right"], ["y", "up and down"], ["xy", "both"]];
 const SYMMETRIES_IN_SPACE: [string, string][] = [
-  ["", "none"], ["x", "left and right"], ["y", "front and back"], ["xy", "both"], ["3-fold", "3-fold about the middle"], ["4-fold", "4-fold about the middle"]];
+  ["", "none"], ["x", "left and right"], ["y", "front and back"], ["xy", "both"], ["3-fold", "3-fold"], ["4-fold", "4-fold"]];
 
 export function limitsPanel(editor: TaskEditor): HTMLElement {
   const { table } = editor.task;
@@ -42,7 +42,8 @@ function toleranceFields(editor: TaskEditor, tolerance: Tolerance): HTMLElement 
     amount(`tolerance-${key}`, label, tolerance[key], unit, (given) =>
       editor.change({ ...editor.task.table, tolerance: cleaned({ ...editor.task.table.tolerance, [key]: given }) }), help);
   return h("div", {},
-    h("div", { class: "row" }, field("width", "All widths", "", "such as 20%"), field("each_width", "Each width", "", "standard deviation, 5%")),
-    h("div", { class: "row" }, field("node", "Nodes", "mm", "0.1 mm"), field("angle", "Direction of the input", "°", "5 degrees")),
-    h("div", { class: "row" }, field("keep", "Prints keep of the gain", "", "such as 80%; empty: they meet all items"), field("least_yield", "Prints that do so at least", "", "such as 95%")));
+    h("div", { class: "row" }, field("width", "All widths", "", "such as 20%; empty: 10%"), field("each_width", "Each width", "", "standard deviation; empty: 5%")),
+    h("div", { class: "row" }, field("node", "Nodes", "mm", "empty: 0.1 mm"), field("angle", "Direction of the input", "°", "empty: 5 degrees")),
+    h("div", { class: "row" }, field("keep", "Prints keep of the gain", "", "such as 80%; empty: they meet all items"), field("least_yield", "Prints that do so at least", "", "empty: 95%")),
+    h("p", { class: "note" }, "Widths, nodes and the direction of the input of each random print deviate. A push that is 5° off moves what it pushes sideways by 9 % of the stroke. Without this, the tolerance of a result can be computed all the same."));
 }

@@ -1,9 +1,19 @@
 // Marks of rollers and mirror axes, and navigation from node to node with the arrow keys.
 
-import type { Point } from "./api";
+import type { Point, Problem } from "./api";
 import type { Box } from "./drawing";
 import type { Shape } from "./task";
 import type { View } from "./view";
+
+/** Where outputs move to, beside which no dimension is drawn: one unit from their middles. */
+export function outputTips({ positions, output, specification }: Problem): Point[] {
+  const cases = specification?.cases ?? [];
+  const outputs = [output, ...Object.values(specification?.outputs ?? {}), ...cases.flatMap((each) => Object.values(each.outputs))];
+  return outputs.filter(({ nodes }) => nodes.length).map(({ nodes, direction }) => {
+    const along = (Array.isArray(direction[0]) ? direction[0] : direction) as Point;
+    return [0, 1].map((axis) => nodes.reduce((sum, node) => sum + positions[node]![axis]!, 0) / nodes.length + along[axis]!) as Point;
+  });
+}
 
 /** Directions in which nodes may slide, as a path. */
 export function rollerLines(rest: Float64Array, along_y: number[], along_x: number[]): string {

@@ -246,7 +246,8 @@ export class Panels {
 
   private limitsSummary(): string {
     const { limits, tolerance } = this.editor.task.table;
-    const parts = [limits?.symmetry && `symmetric in ${limits.symmetry}`, limits?.mass !== undefined && "mass", limits?.strut_loss !== undefined && "strut loss", tolerance && "tolerance"];
+    const { strain, clearance } = limits ?? {};
+    const parts = [strain !== undefined && typeof strain !== "boolean" && `strain ${strain}`, clearance !== undefined && typeof clearance !== "boolean" && "clearance", limits?.symmetry && (/fold/.test(limits.symmetry) ? `${limits.symmetry} symmetry` : `symmetric in ${limits.symmetry}`), limits?.mass !== undefined && "mass", limits?.strut_loss !== undefined && "strut loss", tolerance && "tolerance"];
     return parts.filter(Boolean).join(", ") || "strain and clearance";
   }
 

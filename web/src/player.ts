@@ -4,6 +4,7 @@ import { isInSpace, isTurning, post, type Motion, type Point, type Problem, type
 import { bitsOf } from "./api";
 import { binned, BINS, Drawing, markRegions, sectionOf, where, type Group, type LatticeDrawing } from "./drawing";
 import { loadSpace } from "./loadspace";
+import { outputTips } from "./marks";
 import { choice, clear, field, figure, h, icon, s } from "./dom";
 import { sentence } from "./text";
 
@@ -86,7 +87,7 @@ export class Player {
     if (drawing instanceof Drawing) {
       drawing.overlay.append(this.stress);
       drawing.printed(this.outline, this.screws);
-      drawing.dimensions(this.scale);
+      drawing.dimensions(this.scale, outputTips(this.problem));
     }
     drawing.element.addEventListener("pointermove", (event) => this.point(event as PointerEvent));
     if (this.motion) this.showMotion(this.motion);
@@ -137,11 +138,10 @@ export class Player {
   }
 
   /** Colour the struts by what the loss of each costs. */
-  showLosses({ beams, cost }: ToleranceFound["losses"], paint = true): void {
+  showLosses({ beams, cost }: ToleranceFound["losses"]): void {
     this.losses = { beams, cost };
     const bar = this.element.querySelector(".colour");
     if (bar && !bar.querySelector('input[value="loss"]')) bar.firstElementChild!.replaceWith(this.colours());
-    if (paint) this.paint("loss");
   }
 
   /** Struts by the part of the efficiency that their loss costs. */

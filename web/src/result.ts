@@ -46,6 +46,8 @@ const LEAST_SHARE = 0.05;
 
 /** Smallest part of the random prints that meet all items, with which a verdict is green. */
 const LEAST_YIELD = 0.9;
+/** Number of remarks on printing that are shown at once. */
+const FEW_REMARKS = 3;
 
 /** Effort of a search that begins with a design. */
 const CONTINUED = { steps: 8000, chains: 2 };
@@ -118,7 +120,10 @@ export class Result {
       await resumed;
       const { level } = this.body;
       const isQuick = this.body === FLAT_BODY && found.levels.some(({ name, missing }) => name === level && !missing);
-      if (this.subject.problem.specification && isQuick && !this.known.fems[level]) void this.validate(level, false);
+      const { specification } = this.subject.problem;
+      if (specification && isQuick && !this.known.fems[level]) void this.validate(level, false);
+      // Random prints are an item of such a specification.
+      if (specification?.tolerances && this.known.tolerance === null) void this.computeTolerance();
       this.showTable();
       this.showPart();
       this.showFiles();
@@ -143,7 +148,7 @@ export class Result {
     }
     if (stored?.tolerance && "result" in stored.tolerance) {
       known.tolerance = stored.tolerance.result;
-      this.player.showLosses(known.tolerance.losses, false);
+      this.player.showLosses(known.tolerance.losses);
     } else if (stored?.tolerance) void this.computeTolerance();
     if (stored?.print && "result" in stored.print) known.print = stored.print.result;
     else if (stored?.print) void this.slice();
@@ -184,7 +189,7 @@ export class Result {
   private shareText(name: string): string {
     const share = this.known.shares[name];
     if (share === undefined) return " …";
-    if (share === null) return ", waiting for other computations …";
+    if (share === null) return ", waiting for other checks of parts …";
     const [first, began] = this.known.began[name] ?? [share, 0];
     const left = share - first < LEAST_SHARE ? "" : `, about ${duration(((1 - share) * (Date.now() - began)) / (share - first) / 1000)} left`;
     return `, ${Math.round(100 * share)} %${left} …`;
@@ -243,6 +248,8 @@ export class Result {
     if (report.items.frames) columns.push({ title: "frames", items: report.items.frames });
     else if (report.items.search) columns.push({ title: "search", items: report.items.search });
     if (solid?.items) columns.push({ title, items: solid.items });
+    const prints = this.printsItem(report);
+    if (prints) for (const [k, column] of columns.entries()) column.items = [...column.items, k ? { ...prints, reached: "" } : prints];
     const last = columns.at(-1)?.items ?? null;
     const unstable = !first || first.efficiency === undefined || (report.specified && !report.items.frames);
     const isMet = last !== null && columns.every(({ items }) => items.every(({ met }) => met)) && !unstable;
@@ -264,6 +271,14 @@ export class Result {
     clear(this.advice, defect && h("p", {}, defect), defect && h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text))));
   }
 
+  /** What random prints do, where the specification asks for it and the tolerance is known. */
+  private printsItem({ tolerance: wanted }: PartReport): ItemState | null {
+    const { tolerance: found } = this.known;
+    if (!wanted || !found || typeof found === "string" || !found.prints) return null;
+    const share = found.met / found.prints;
+    return { ...wanted, reached: `${Math.round(100 * share)} %`, margin: share - wanted.least_yield, met: share >= wanted.least_yield };
+  }
+
   /** Whether the tolerance is known, and hardly any random print misses it. */
   private get hasYield(): boolean {
     const { tolerance } = this.known;
@@ -275,7 +290,7 @@ export class Result {
     const { tolerance } = this.known;
     if (!tolerance) return " Not checked over tolerances.";
     if (tolerance === "running") return " The tolerance is being computed.";
-    return typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} ${tolerance.met_words}.` : "";
+    return typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} (${Math.round((100 * tolerance.met) / tolerance.prints)} %) ${tolerance.met_words}${tolerance.met < LEAST_YIELD * tolerance.prints ? "; see Tolerance below" : ""}.` : "";
   }
 
   private showTable(): void {
@@ -371,19 +386,27 @@ export class Result {
     const first = ["drawn", "95 %", "yield"];
     const worst = head!.map((name, k) => ({ name, k })).filter(({ name }) => ![...first, "item", "wanted"].includes(name));
     clear(this.toleranceBox, h("p", {}, sentence(tolerance.sentence)),
-      h("p", { class: "note" }, `95 %: the value that 95 of 100 random prints reach. Yield: the part of the prints that meet an item. Worst values are those for ${tolerance.deviations}, and of the prints. “lost”: the part does not reach the full stroke; “more”: above the bound.`),
+      h("p", { class: "note" }, `95 %: the value that 95 of 100 random prints reach. Yield: the part of the prints that meet an item. Worst values are those for ${tolerance.deviations}, and of the prints. “lost”: the part does not reach the full stroke.`),
       h("table", { class: "items tolerance" }, h("caption", {}, "Values as drawn, and in the scenarios"),
         h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "item"), ...first.map((name) => h("th", { scope: "col" }, name)))),
         ...rows.map((row) => h("tbody", {},
           h("tr", {}, h("th", { scope: "rowgroup" }, row[0]!, h("small", {}, row[1]!)), ...first.map((name) => h("td", {}, row[head!.indexOf(name)]!))),
           h("tr", { class: "worst" }, h("td", { colspan: 4 }, "worst: ", worst.map(({ name, k }) => `${name} ${row[k]}`).join(", ")))))),
-      this.lossText(tolerance.losses));
+      this.lossText(tolerance.losses),
+      ...this.toleranceStep(tolerance));
+  }
+
+  /** The next step where too few random prints meet all items. */
+  private toleranceStep({ met, prints }: ToleranceFound): HTMLElement[] {
+    if (!this.subject.problem.specification || !prints || met >= LEAST_YIELD * prints) return [];
+    return [h("p", { class: "note" }, "Refine over tolerances moves the nodes of this design and changes its widths until the items are met with deviations, too, where that is possible. Random prints include a push that is up to 5° off its direction, unless the task says otherwise."),
+      button("Refine over tolerances", () => void this.begin({ refine: true, tolerant: true }), "", { "data-key": "refine-tolerant" })];
   }
 
   private lossText({ cost }: ToleranceFound["losses"]): HTMLElement {
     const needed = cost.filter((each) => each === null).length;
     const half = cost.filter((each) => each !== null && each > 0.5).length;
-    return h("p", { class: "note" }, `Of ${cost.length} struts that are not between two supports, ${needed} are needed to reach the full stroke, and the loss of ${half} others costs more than half of the efficiency. They are coloured in the drawing.`);
+    return h("p", { class: "note" }, `Of ${cost.length} struts that are not between two supports, ${needed} are needed to reach the full stroke, and the loss of ${half} others costs more than half of the efficiency. “Loss of struts” in the drawing colours them.`);
   }
 
   private showPart(fault = ""): void {
@@ -413,7 +436,7 @@ export class Result {
         remarks.mass === null ? "" : `, ${figure(remarks.mass, 1)} g`, remarks.stroke === null ? "" : `, stroke ${figure(remarks.stroke, 2)} mm`),
       remarks && h("p", { class: "note" }, `${this.sweptText(remarks)}${this.excessText(remarks.size)}`),
       remarks && this.hasSlicer && this.printTime(),
-      remarks && remarks.remarks.length > 0 && h("details", { class: "remarks" },
+      remarks && remarks.remarks.length > 0 && h("details", { class: "remarks", open: remarks.remarks.length <= FEW_REMARKS },
         h("summary", {}, `${remarks.remarks.length} ${remarks.remarks.length === 1 ? "remark" : "remarks"} on printing`),
         h("ul", {}, ...remarks.remarks.map((text) => h("li", {}, sentence(text))))));
   }
@@ -468,7 +491,7 @@ export class Result {
     const { thickness, scale, material } = this.part;
     const named = typeof material === "string" ? this.registries?.materials.find(({ name }) => name === material)?.title ?? material : material.name;
     const struts = isInSpace(this.subject.problem) ? `Round struts, diameter ${this.strutText()}` : `Struts ${this.strutText()} wide, ${thickness} mm thick`;
-    return h("p", {}, `${struts}, nodes ${scale} mm apart, ${named}. They belong to the specification; another part is another task.`);
+    return h("p", {}, `${struts}, nodes ${scale} mm apart, ${named}. ${this.subject.problem.widths ? "The refinement has changed the widths. " : ""}Another part is another task.`);
   }
 
   private async describe(): Promise<void> {
@@ -522,7 +545,7 @@ export class Result {
     });
     screws.dataset.key = "screws";
     return h("div", { class: "grips" }, tick("plate", "Fill the supports to a plate for clamping"),
-      this.grips.plate && field("Screw holes, 3.4 mm", screws), tick("pad", "Fill the input to a pad for pushing"), tick("output_pad", "Fill the output to a pad for mounting"),
+      this.grips.plate && field("Number of screw holes (3.4 mm)", screws), tick("pad", "Fill the input to a pad for pushing"), tick("output_pad", "Fill the output to a pad for mounting"),
       this.hasGrips && h("p", { class: "note", "data-gripped": "yes" }, this.grippedText()));
   }
 
@@ -602,8 +625,8 @@ export class Result {
     if (place) void this.offer(others, place);
     return h("div", {}, h("div", { class: "content buttons" },
       plan && button("Open its plan", () => { location.hash = `#/machine/${plan}`; }, "strong"),
-      problem.specification && button("Refine", () => void this.begin(true)),
-      button("Search on", () => void this.begin(false)),
+      problem.specification && button("Refine", () => void this.begin({ refine: true })),
+      button("Search on", () => void this.begin({})),
       button("Open its task", () => void open(false)),
       button("Change by hand", () => void open(true))),
       h("p", { class: "note content" }, problem.specification ? "Refine moves the nodes of this design and changes its widths until it meets all items with a larger objective. " : "",
@@ -612,13 +635,13 @@ export class Result {
   }
 
   /** Begin a search at this design, or its refinement. */
-  private async begin(refine: boolean): Promise<void> {
+  private async begin({ refine = false, tolerant = false }: { refine?: boolean; tolerant?: boolean }): Promise<void> {
     const { problem, mask, title, provenance } = this.subject;
     // The struts of a refined design belong to its own nodes, not to those of its task.
     const task = refine || "refinement" in provenance ? null : this.subject.task ?? provenance["task"] ?? null;
     try {
       const { id } = await post<{ id: string }>("/runs", {
-        title: `${title.replace(/, (refined|searched on)$/, "")}, ${refine ? "refined" : "searched on"}`.slice(-120), session: session(), start: mask, refine,
+        title: `${title.replace(/, (refined|searched on)$/, "")}, ${refine ? "refined" : "searched on"}`.slice(-120), session: session(), start: mask, refine, tolerant,
         ...(task ? { task } : { problem, part: this.part }), steps: CONTINUED.steps, chains: CONTINUED.chains, seed: Math.floor(Math.random() * 2 ** 31),
       });
       location.hash = `#/run/${id}`;

@@ -3,6 +3,7 @@
 import { fetchRegistries, follow, get, isInSpace, modelOf, post, remove, type Problem, type Registries, type RunUpdate, type ServerError, type Run, type RunDetails } from "./api";
 import { bitsOf } from "./api";
 import { Chart } from "./chart";
+import { outputTips } from "./marks";
 import { Drawing, markRegions, sectionOf, where, type LatticeDrawing } from "./drawing";
 import { loadSpace } from "./loadspace";
 import { announce, button, choice, clear, count, duration, figure, h } from "./dom";
@@ -74,9 +75,10 @@ export class RunPage {
   private describeMethod(search: Registries["searches"][number] | undefined): void {
     if (!search) return;
     this.method = search;
-    const curve = search.running_best ? "The best design of each chain so far." : "The current design of each chain.";
+    const curve = search.running_best ? "The best design of each chain so far, that of the best chain in blue." : "The current design of each chain.";
     const missed = this.run.problem.specification ? " Only designs that meet the items, or miss them by what a refinement mends, have a point in the chart." : "";
-    this.curveNote.textContent = `${curve}${missed}${this.run.settings.replicas === undefined ? " Shaded: phases of higher temperature." : ""}`;
+    // Struts of the drawing may carry no load yet.
+    this.curveNote.textContent = `Struts without load are removed from the result. ${curve}${missed}${this.run.settings.replicas === undefined ? " Shaded: steps that also accept worse designs." : ""}`;
     this.show(this.run);
   }
 
@@ -118,7 +120,7 @@ export class RunPage {
       return;
     }
     this.drawing.setLattice(problem.positions, problem.beams);
-    if (this.drawing instanceof Drawing && this.run.part) this.drawing.dimensions(this.run.part.scale);
+    if (this.drawing instanceof Drawing && this.run.part) this.drawing.dimensions(this.run.part.scale, outputTips(problem));
     this.paper.append(this.drawing.element);
     this.draw(problem.initial, null, null);
     this.drawLive();
@@ -240,7 +242,7 @@ export class RunPage {
   private bestText(run: Run): string {
     const { best } = this.chart;
     if (!this.run.problem.specification) return figure(run.efficiency ?? best, 3);
-    return best !== null ? figure(best * this.unit, 3) : this.chart.curves.size ? "no design of the search meets all items" : "–";
+    return best !== null ? figure(best * this.unit, 3) : this.chart.curves.size ? "no design meets all items before refinement" : "–";
   }
 
   /** Show why a search has no design, and suggestions. */

@@ -112,7 +112,9 @@ export class SpaceCanvas implements TaskDrawing {
     if (!picksNodes || !view) return;
     // Single nodes of a layer may have another role already, such as an input amid an output.
     const taken = new Set(tool === "loads" ? [] : [...view.held.flatMap(({ nodes }) => nodes), ...view.arrows.filter(({ target }) => target.kind !== "loads").flatMap(({ nodes }) => nodes)]);
-    this.actions.nodes(this.pickable.filter((node) => !taken.has(node)), true);
+    const free = this.pickable.filter((node) => !taken.has(node));
+    if (free.length) this.actions.nodes(free, true);
+    else this.actions.note("All nodes of this layer belong to a support, an input or an output.");
   }
 
   private paint(): void {

@@ -10,7 +10,7 @@ export interface Column { title: string; items: ItemState[] }
 export function otherObjective(objectives: Objective[]): Objective | null {
   const first = objectives[0];
   // A payload beyond the wanted one is not always determined.
-  return first && first.quantity !== "gain" && /\d/.test(first.reached) ? first : null;
+  return first && first.quantity !== "gain" && /^[-\d]/.test(first.reached) ? first : null;
 }
 
 /** One sentence on a list of items: whether all are met, and which one is farthest from it. */

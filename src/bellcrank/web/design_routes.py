@@ -133,8 +133,9 @@ async def get_tolerance(body: PartBody, state: State) -> dict[str, Any]:
 @router.post("/validation")
 async def get_validation(body: FemBody, state: State) -> dict[str, Any]:
     """Return the finite-element analysis of the part of a design."""
-    # Frames take seconds and do not wait for the checks that take minutes.
-    pool = state.pools.files if body.level == "frame" else state.pools.checks
+    # Frames take seconds, a body up to an hour: neither waits for checks that take minutes.
+    pools = {"frame": state.pools.files, "solid": state.pools.solids}
+    pool = pools.get(body.level, state.pools.checks)
     return await _slow(state, pool, slow_calls.validation, body, body.level)
 
 

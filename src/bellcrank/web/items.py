@@ -41,13 +41,26 @@ def wanted_items(problem: Problem, part: PartSpec) -> list[dict[str, str]]:
                 "wanted": f"as {size} as possible",
             }
         )
-    if wanted.tolerances is not None:
-        share, keep = wanted.tolerances.least_yield, wanted.tolerances.keep
-        found = f"keep {keep:.0%} of the gain" if keep else "meet all items"
-        items.append(
-            {"name": "tolerance", "label": "random prints", "wanted": f"{share:.0%} {found}"}
-        )
+    prints = wanted_of_prints(problem)
+    if prints is not None:
+        items.append({key: prints[key] for key in ("name", "label", "wanted")})
     return items
+
+
+def wanted_of_prints(problem: Problem) -> dict[str, Any] | None:
+    """Return what a specification wants of random prints, and of which part of them.
+
+    None without tolerances.
+    """
+    wanted = problem.specification
+    if wanted is None or wanted.tolerances is None:
+        return None
+    share, keep = wanted.tolerances.least_yield, wanted.tolerances.keep
+    found = f"keep {keep:.0%} of the gain" if keep else "meet all items"
+    return {
+        "name": "tolerance", "label": "random prints", "wanted": f"{share:.0%} {found}",
+        "least_yield": share,
+    }  # fmt: skip
 
 
 def objective_states(
@@ -76,7 +89,7 @@ def item_states(
         states.append(
             {
                 **_texts(each.item, problem, units),
-                "reached": _reached(each.item, value, units),
+                "reached": number_text(each.item, value, units) + _grams(each.item, value, units),
                 "margin": finite(each.margin) if math.isfinite(value) else None,
                 "met": bool(each.met),
             }
@@ -92,13 +105,6 @@ def _texts(item: Item, problem: Problem, units: ProblemUnits) -> dict[str, str]:
         "label": item_label(item, problem),
         "wanted": wanted_text(item, units) + _grams(item, item.at_least, units) + halved,
     }
-
-
-def _reached(item: Item, value: float, units: ProblemUnits) -> str:
-    """Return a value with its unit; a payload above the wanted one is not always determined."""
-    if value == math.inf and item.at_least is not None:
-        return f"> {number_text(item, item.at_least, units)}"
-    return number_text(item, value, units) + _grams(item, value, units)
 
 
 def _grams(item: Item, value: float | None, units: ProblemUnits) -> str:

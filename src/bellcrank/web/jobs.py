@@ -59,6 +59,8 @@ class Record:
         Reason of a failure.
     efficiency
         Efficiency of the result, or of the best design so far.
+    objective
+        Name and value of what was maximised or minimised, if that is not the efficiency.
     done
         Proposals of all chains when the search last ended.
     """
@@ -74,6 +76,7 @@ class Record:
     status: str = "queued"
     message: str = ""
     efficiency: float | None = None
+    objective: str = ""
     done: int = 0
 
 
@@ -133,6 +136,7 @@ class Job:
             "efficiency": best
             if best is not None and record.status in UNFINISHED
             else record.efficiency,
+            "objective": record.objective,
             "method": settings["search"],
             "settings": settings,
             "part": record.part,

@@ -26,6 +26,8 @@ T = TypeVar("T")
 
 
 ENDS = "the server has ended"
+SOLID_LIMIT = 7200
+"""Longest time of the finite elements of a body in s."""
 
 
 class Busy(RunFailed):
@@ -226,13 +228,16 @@ class Pools:
     files
         Calls for files, movies, print times and frames, seconds to a minute each.
     checks
-        Calls for finite elements of the outline or the body and for tolerances, minutes each.
+        Calls for finite elements of the outline and for tolerances, minutes each.
+    solids
+        Calls for finite elements of the body, up to an hour each.
     """
 
     quick: Pool
     thorough: Pool
     files: Pool
     checks: Pool
+    solids: Pool
 
     async def prepare(self) -> None:
         """Start the pools of fast calls and load or compile the kernels."""
@@ -241,7 +246,7 @@ class Pools:
 
     def end(self) -> None:
         """End all processes."""
-        for pool in (self.quick, self.thorough, self.files, self.checks):
+        for pool in (self.quick, self.thorough, self.files, self.checks, self.solids):
             pool.end()
 
 
@@ -252,4 +257,5 @@ def make_pools() -> Pools:
         thorough=Pool(seconds=120, waiting=32, niceness=2),
         files=Pool(seconds=1800, waiting=12, niceness=3, recycle=40, stoppable=True),
         checks=Pool(seconds=1800, waiting=12, niceness=5, recycle=40, stoppable=True),
+        solids=Pool(seconds=SOLID_LIMIT, waiting=12, niceness=5, recycle=40, stoppable=True),
     )

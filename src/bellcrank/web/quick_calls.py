@@ -23,7 +23,7 @@ from bellcrank.search import SpecificationEvaluator
 from bellcrank.search.clearance import gap_of_frame
 from bellcrank.search.verdict import Verdict
 from bellcrank.search.verification import ELEMENTS
-from bellcrank.web.items import item_states, objective_states
+from bellcrank.web.items import item_states, objective_states, wanted_of_prints
 from bellcrank.web.task_files import problem_of
 from bellcrank.workflows.condition_texts import condition_texts
 from bellcrank.workflows.figures import model_words
@@ -149,6 +149,7 @@ def part_report(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
     The figures are those of frames with eight elements in each strut, for each output of each load
     case. Items are given in the model of the search and by eight elements; None for a path that is
     not stable. Objectives are by eight elements. Conditions are the inputs and loads in words.
+    ``tolerance`` has what is wanted of random prints, None without tolerances.
     """
     spec = PartSpec.from_dict(part, "part")
     design = design_of(text, mask)
@@ -165,6 +166,7 @@ def part_report(text: str, mask: str, part: dict[str, Any]) -> dict[str, Any]:
         "items": items,
         "objectives": objectives,
         "conditions": condition_texts(problem, spec),
+        "tolerance": wanted_of_prints(problem),
         "figures": part_figures(design, spec, ELEMENTS),
     }
 

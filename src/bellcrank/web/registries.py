@@ -14,6 +14,15 @@ from bellcrank.web.page_files import page_files
 MATERIAL_TITLES = {"ninjaflex": "NinjaFlex"}
 """Display names of materials that are no abbreviations."""
 
+CELL_TITLES = {
+    "octet": "octet: stiff, 12 struts at a node",
+    "cubic": "cubic with diagonals: nodes in vertical lines",
+    "body-centred": "body centred: soft, 8 struts at a node",
+    "kelvin": "kelvin: open, 4 struts at a node",
+    "displaced-delaunay-space": "irregular nodes",
+}
+"""Display names of lattices in space."""
+
 
 @cache
 def registered() -> dict[str, list[dict[str, Any]]]:
@@ -24,7 +33,7 @@ def registered() -> dict[str, list[dict[str, Any]]]:
     """
     methods = sorted(searches, key=lambda name: name != DEFAULT_SEARCH)
     return {
-        "cells": [{"name": name, "title": name.replace("-", " ")} for name in CELLS],
+        "cells": [{"name": name, "title": CELL_TITLES[name]} for name in CELLS],
         "searches": [
             {
                 "name": name,

@@ -150,7 +150,8 @@ class RunBody(Body):
     """A search to be started, for a task with a specification or for a problem.
 
     It begins with the design ``start``, by default with the full lattice. With ``refine``, this
-    design is refined, without a search.
+    design is refined, without a search; with ``tolerant``, over the usual tolerances unless it has
+    its own.
     """
 
     title: str = Field(min_length=1, max_length=120)
@@ -166,6 +167,7 @@ class RunBody(Body):
     reference: Mask | None = None
     start: Mask | None = None
     refine: bool = False
+    tolerant: bool = False
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -175,6 +177,8 @@ class RunBody(Body):
             raise ValueError("the part is that of the task")
         if self.refine and self.start is None:
             raise ValueError("start: expected the design to be refined")
+        if self.tolerant and not self.refine:
+            raise ValueError("tolerant: expected a refinement")
         return self
 
 

@@ -58,10 +58,11 @@ async def start_run(body: RunBody, state: State) -> dict[str, str]:
 
 def _validated(body: RunBody) -> tuple[Problem, Record]:
     """Return problem and record of a request; an invalid one is refused before it is queued."""
-    from bellcrank.model import unpack_mask
+    from bellcrank.model import Design, unpack_mask
     from bellcrank.part import PartSpec, frame_problem
     from bellcrank.search import read_settings
     from bellcrank.search.constraints import parse_goal
+    from bellcrank.workflows.tolerance import with_tolerances
 
     task = None if body.task is None else task_of(table_in(body.task))
     problem = problem_of(body.problem or {}) if task is None else task.problem
@@ -89,6 +90,9 @@ def _validated(body: RunBody) -> tuple[Problem, Record]:
         problem = replace(problem, initial=unpack_mask(body.start, problem.lattice.beam_count))
     if body.refine and not problem.is_specified:
         raise InvalidSettings("a refinement needs a specification: ask for something of an output")
+    if body.tolerant:
+        design = Design(problem, problem.initial)
+        problem = with_tolerances(design, spec or PartSpec()).problem
     plain = json.loads(json.dumps(settings.to_dict()))
     record = Record(
         title=body.title,

@@ -229,6 +229,7 @@ class Scheduler:
             job.update(
                 status=last["kind"],
                 efficiency=last.get("efficiency"),
+                objective=last.get("objective", ""),
                 done=done,
                 message=last.get("message", ""),
             )

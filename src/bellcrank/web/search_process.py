@@ -113,15 +113,14 @@ def _search(
                 assert report is not None  # without a request to stop
             except InvalidSettings:
                 return {"kind": "paused", "message": NO_DESIGN_YET}
-            return {"kind": "stopped", "efficiency": report.selection.efficiency_after}
+            return {"kind": "stopped", **_reached(where)}
     if report is None:
         return {"kind": "paused"}
-    return {"kind": "finished", "efficiency": report.selection.efficiency_after}
+    return {"kind": "finished", **_reached(where)}
 
 
 def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[str, Any]:
     """Refine the initial design of a job, and write the result as that of a search."""
-    from bellcrank.fem.results import finite
     from bellcrank.model import Design, read_problem, write_design
     from bellcrank.part import PartSpec
     from bellcrank.refine import RefinementSettings
@@ -156,9 +155,30 @@ def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[st
     (where / "run").mkdir(exist_ok=True)
     write_design(result, where / "run" / "design.json", overwrite=True)
     message = "" if found.improved else f"the design was not improved: {found.reason}"
-    efficiency = None if result.efficiency is None else finite(result.efficiency)
     kind = "stopped" if listener.stop.is_set() else "finished"
-    return {"kind": kind, "efficiency": efficiency, "message": message}
+    return {"kind": kind, "message": message, **_reached(where)}
+
+
+def _reached(where: Path) -> dict[str, Any]:
+    """Return the efficiency of a result, and its objective in words unless it is the efficiency."""
+    from bellcrank.fem.results import finite
+    from bellcrank.model import read_design
+    from bellcrank.part import PartSpec
+    from bellcrank.search.verification import ELEMENTS
+    from bellcrank.web.items import objective_states
+    from bellcrank.workflows.specification import evaluated
+
+    design = read_design(where / "run" / "design.json")
+    job = json.loads((where / "job.json").read_text(encoding="utf-8"))
+    objective = ""
+    if design.problem.is_specified:
+        found = evaluated(design.problem, design.mask, ELEMENTS)
+        part = PartSpec.from_dict(job["part"] or {}, "part")
+        states = [] if found is None else objective_states(design.problem, part, found)
+        if states and states[0]["quantity"] != "gain":
+            objective = f"{states[0]['label']} {states[0]['reached']}"
+    efficiency = None if design.efficiency is None else finite(design.efficiency)
+    return {"efficiency": efficiency, "objective": objective}
 
 
 def _start_or_reopen(where: Path) -> RunFolder:

@@ -57,6 +57,8 @@ def item_label(item: Item, problem: Problem) -> str:
 def number_text(item: Item, value: float, units: ProblemUnits) -> str:
     """Return a value of the quantity of an item with its unit.
 
+    An infinite value is one above the lower bound, which is not always determined.
+
     Examples
     --------
     >>> from bellcrank.model import Item
@@ -66,7 +68,7 @@ def number_text(item: Item, value: float, units: ProblemUnits) -> str:
     '3.21 %'
     """
     if value == math.inf:
-        return "more"
+        return "more" if item.at_least is None else f"> {number_text(item, item.at_least, units)}"
     if not math.isfinite(value):
         return "-"
     unit = _unit(item)

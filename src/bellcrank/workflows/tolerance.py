@@ -45,7 +45,7 @@ WIDTH, NODE = 0.1, 0.1
 """Usual deviations of widths and of coordinates of nodes, mm."""
 LOST = "lost"
 """Text for a value in a scenario without a stable path to the full stroke."""
-MISSED = " *"
+MISSED = "\u00a0*"
 """End of a value that does not meet its item."""
 
 
@@ -290,8 +290,12 @@ def tolerance_rows(report: ToleranceReport) -> list[list[str]]:
         def text(value: float, item: Item = item) -> str:
             return LOST if np.isnan(value) else number_text(item, shown_value(item, value), units)
 
-        worst = [row.worst[kind] for kind in kinds]
-        found = [text(each.value) + (MISSED if not each.met else "") for each in worst]
+        worst = [(kind, row.worst[kind]) for kind in kinds]
+        found = [
+            # Items are wanted at the full stroke, not at half of it.
+            text(each.value) + (MISSED if not each.met and kind != "stroke" else "")
+            for kind, each in worst
+        ]
         cells = [item_label(item, problem), wanted, text(row.nominal), *found]
         if has_prints:
             share = "" if np.isnan(row.share) else f"{100.0 * row.share:.0f} %"

@@ -87,7 +87,9 @@ def analyse_solid(part: Part, settings: FemSettings, report: Callable[[float], N
 levels.register("plane")(
     Level(analyse_plane, check_plane, missing_ngsolve, "2D solid", "up to a minute", in_space=False)
 )
-levels.register("solid")(Level(analyse_solid, check_solid, missing_ngsolve, "3D solid", "minutes"))
+levels.register("solid")(
+    Level(analyse_solid, check_solid, missing_ngsolve, "3D solid", "some minutes to an hour")
+)
 
 
 def _analyse(
