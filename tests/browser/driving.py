@@ -71,10 +71,16 @@ def _nearest(page: Any, marks: str, x: float, y: float) -> tuple[float, float]:
 
 
 def section(page: Any, name: str) -> None:
-    """Open a section of the panel."""
+    """Open a section of the panel, which may still be drawn for a task that is loaded."""
     head = page.locator(f".step.{name} h2 button")
-    if head.get_attribute("aria-expanded") == "false":
-        head.click()
+
+    def is_open() -> bool:
+        if head.get_attribute("aria-expanded") == "false":
+            head.click()
+        page.wait_for_timeout(300)
+        return bool(head.get_attribute("aria-expanded") == "true")
+
+    until(page, is_open)
 
 
 def field(page: Any, label: str) -> str:
