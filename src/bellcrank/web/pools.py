@@ -64,7 +64,8 @@ def _initialize(niceness: int, lifeline: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server stops its processes itself
     if hasattr(os, "nice"):
         os.nice(niceness)
-    lifeline.send(os.getpid())
+    with contextlib.suppress(OSError):  # the server has ended meanwhile
+        lifeline.send(os.getpid())
     threading.Thread(target=_exit_on_close, args=(lifeline,), daemon=True).start()
 
 
