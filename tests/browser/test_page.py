@@ -29,6 +29,7 @@ from bellcrank.task import find_task, read_task, task_from_dict
 from bellcrank.workflows import validate
 from bellcrank.workflows.part_figures import part_figures
 from bellcrank.workflows.specification import item_rows
+from bellcrank.workflows.tolerance import with_tolerances
 
 from .driving import (
     click,
@@ -430,6 +431,37 @@ def test_a_computation_is_stopped_and_begun_again(page: Any, server: Server) -> 
     assert stop.count() == 0
 
 
+def test_random_prints_are_an_item_of_a_task_over_tolerances(page: Any, server: Server) -> None:
+    bundled = find_task("slider")
+    assert bundled is not None
+    design = with_tolerances(bundled.problem.full_design(), bundled.part)
+    body = {
+        "problem": problem_to_dict(design.problem), "mask": design.mask_hex, "title": "prints",
+        "provenance": {"part": bundled.part.to_dict()},
+    }  # fmt: skip
+    kept = page.request.post(f"{server.address}/api/gallery", data=body).json()
+    found = {
+        "sentence": "20 random prints", "prints": 20, "met": 18, "met_words": "meet all items",
+        "deviations": "widths", "rows": [["item", "wanted", "drawn", "95 %", "yield"]],
+        "losses": {"beams": [], "cost": []},
+    }  # fmt: skip
+    page.route("**/api/validation", lambda _route: None)  # it is never answered
+    page.route("**/api/tolerance", lambda route: route.fulfill(json=found))
+    page.goto(f"{server.address}/#/design/{kept['source']}/{kept['key']}")
+    row = page.locator('[aria-label="Result"] tr[data-item="tolerance"]')
+    row.wait_for()
+    assert row.get_attribute("class") == "missed"  # 95 % are wanted
+    assert "random prints" in row.inner_text()
+    assert "90 %" in row.inner_text()
+    verdict = page.locator('[aria-label="Result"] .verdict').inner_text()
+    assert "Of 20 random prints, 18 (90 %) meet all items; see Tolerance below." in verdict
+    with page.expect_request("**/api/runs") as asked:
+        page.get_by_role("button", name="Refine over tolerances").click()
+    assert asked.value.post_data_json["tolerant"]
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Continue").wait_for()
+
+
 def test_the_tolerance_of_a_design_is_shown_and_it_is_compared_with_another(
     page: Any, server: Server
 ) -> None:
@@ -438,6 +470,7 @@ def test_the_tolerance_of_a_design_is_shown_and_it_is_compared_with_another(
     page.get_by_role("button", name="Compute the tolerance").click()
     page.locator(".items.tolerance tbody tr").first.wait_for()
     page.locator(".colour label", has_text="Loss of struts").click()
+    assert page.locator('.colour input[value="loss"]').is_checked()
     assert page.locator(".player .beam.effect-3").get_attribute("d")
     page.get_by_label("Fill the supports to a plate for clamping").check()
     page.locator('[data-key="screws"]').fill("2")

@@ -31,8 +31,8 @@ from bellcrank.search.symmetry import beam_images
 from bellcrank.task import find_task
 from bellcrank.web.page_files import page_files
 from bellcrank.web.requests import RunBody
-from bellcrank.web.run_routes import _validated
-from bellcrank.web.search_process import _reached
+from bellcrank.web.run_routes import validated
+from bellcrank.web.search_process import result_of
 from bellcrank.web.task_tables import table_in, task_of
 from bellcrank.workflows.fabricate import (
     Grips,
@@ -92,7 +92,7 @@ def test_a_design_is_refined_over_the_usual_tolerances_on_request() -> None:
     mask = task.problem.full_design().mask_hex
     body = RunBody(title="a", session="b", task=SIZED, start=mask, refine=True)
     for tolerant, wanted in ((False, None), (True, Tolerances(node=0.1 / task.part.scale))):
-        problem, record = _validated(body.model_copy(update={"tolerant": tolerant}))
+        problem, record = validated(body.model_copy(update={"tolerant": tolerant}))
         assert problem.specification is not None
         assert problem.specification.tolerances == wanted
         assert record.refine
@@ -108,7 +108,7 @@ def test_a_result_has_what_was_maximised_in_the_list(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     write_design(design, tmp_path / "run" / "design.json")
     (tmp_path / "job.json").write_text(json.dumps({"part": task.part.to_dict()}))
-    found = _reached(tmp_path)
+    found = result_of(tmp_path)
     assert found["efficiency"] == 0.25
     assert re.fullmatch(r"travel -?[\d.]+ mm", found["objective"])
 

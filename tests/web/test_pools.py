@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 import time
 
 import pytest
 
 from bellcrank.web.pools import Busy, Pool, ServerEnds
+
+
+async def _end_of(process: int) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        while True:
+            os.kill(process, 0)
+            await asyncio.sleep(0.05)
 
 
 def test_a_cancelled_call_ends_its_process_and_leaves_those_that_wait() -> None:
@@ -24,6 +32,7 @@ def test_a_cancelled_call_ends_its_process_and_leaves_those_that_wait() -> None:
             with pytest.raises(asyncio.CancelledError):
                 await stopped
             second = await waiting
+            await asyncio.wait_for(_end_of(first), 20.0)
             return time.perf_counter() - start, first, second
         finally:
             pool.end()

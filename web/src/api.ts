@@ -33,7 +33,7 @@ export interface Specification {
   items: Wanted[];
   maximise: Wanted[];
   /** Deviations of random prints that are to meet all items. */
-  tolerances?: Record<string, number> | null;
+  tolerances?: { least_yield: number } | null;
 }
 
 /** A quantity of an output that is bounded or maximised. */
@@ -84,7 +84,7 @@ export interface PartReport {
   conditions: string[];
   figures: PartFigures[];
   /** What is wanted of random prints; null without tolerances. */
-  tolerance: { name: string; label: string; wanted: string; least_yield: number } | null;
+  tolerance: { name: string; label: string; wanted: string } | null;
 }
 
 /** A part over tolerances: rows of texts, and what the loss of each strut costs. */
@@ -190,6 +190,8 @@ export interface Registries {
   searches: (Named & { summary: string; running_best: boolean })[];
   materials: Named[];
   files: (Named & { purpose: string; in_space: boolean })[];
+  /** Usual deviations over which a task is designed. */
+  tolerance: Named[];
   /** Lattices that fill a domain in space. */
   cells: Named[];
   levels: (Named & { duration: string; missing: string; in_space: boolean })[];

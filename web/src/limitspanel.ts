@@ -41,9 +41,10 @@ function toleranceFields(editor: TaskEditor, tolerance: Tolerance): HTMLElement 
   const field = (key: keyof Tolerance, label: string, unit: string, help: string): HTMLElement =>
     amount(`tolerance-${key}`, label, tolerance[key], unit, (given) =>
       editor.change({ ...editor.task.table, tolerance: cleaned({ ...editor.task.table.tolerance, [key]: given }) }), help);
+  const usual = (key: keyof Tolerance): string => `empty: ${editor.registries?.tolerance.find(({ name }) => name === key)?.title ?? "the usual"}`;
   return h("div", {},
-    h("div", { class: "row" }, field("width", "All widths", "", "such as 20%; empty: 10%"), field("each_width", "Each width", "", "standard deviation; empty: 5%")),
-    h("div", { class: "row" }, field("node", "Nodes", "mm", "empty: 0.1 mm"), field("angle", "Direction of the input", "°", "empty: 5 degrees")),
-    h("div", { class: "row" }, field("keep", "Prints keep of the gain", "", "such as 80%; empty: they meet all items"), field("least_yield", "Prints that do so at least", "", "empty: 95%")),
+    h("div", { class: "row" }, field("width", "All widths", "", `such as 20%; ${usual("width")}`), field("each_width", "Each width", "", `standard deviation; ${usual("each_width")}`)),
+    h("div", { class: "row" }, field("node", "Nodes", "mm", usual("node")), field("angle", "Direction of the input", "°", usual("angle"))),
+    h("div", { class: "row" }, field("keep", "Prints keep of the gain", "", "such as 80%; empty: they meet all items"), field("least_yield", "Prints that do so at least", "", usual("least_yield"))),
     h("p", { class: "note" }, "Widths, nodes and the direction of the input of each random print deviate. A push that is 5° off moves what it pushes sideways by 9 % of the stroke. Without this, the tolerance of a result can be computed all the same."));
 }

@@ -44,7 +44,7 @@ const STOPPED = 409;
 /** Growth of a share from which the time left is estimated. */
 const LEAST_SHARE = 0.05;
 
-/** Smallest part of the random prints that meet all items, with which a verdict is green. */
+/** Part of the random prints that is to meet all items for a green verdict, where the task does not say which. */
 const LEAST_YIELD = 0.9;
 /** Number of remarks on printing that are shown at once. */
 const FEW_REMARKS = 3;
@@ -257,8 +257,10 @@ export class Result {
     this.verdict.className = `verdict ${!report.specified && !unstable ? "none" : isMet ? (isSure ? "met" : "met pending") : "missed"}`;
     const pending = found === "running" ? `; ${words}, is being computed` : !solid ? `; not checked in ${words}` : !solid.items ? `; not stable in ${words}` : "";
     const by = solid?.items ? ` by frames and in ${words}` : " by frames";
+    // Random prints are computed by frames alone.
+    const missedBy = !solid?.items ? by : solid.items.every(({ met }) => met) && prints?.met === false ? "" : ` in ${words}`;
     clear(this.verdict, ...unstable ? ["The part snaps or collapses before the full stroke, by frames with 8 elements in each strut."]
-      : last ? [`${verdictOf(last)}${isMet || !solid?.items ? by : ` in ${words}`}${pending}`, found === "running" ? this.share(level) : ".", this.printedText()] : ["No specification: the task says nothing about straightness, rotation or load."]);
+      : last ? [`${verdictOf(last)}${isMet ? by : missedBy}${pending}`, found === "running" ? this.share(level) : ".", this.printedText()] : ["No specification: the task says nothing about straightness, rotation or load."]);
     const models: [string, PartFigures[]][] = [["frames", report.figures]];
     if (solid?.figures) models.push([title, solid.figures]);
     const conditions = columns.length > 0 && h("p", { class: "note" }, `Items with ${report.conditions.join("; ")}.`);
@@ -276,13 +278,16 @@ export class Result {
     const { tolerance: found } = this.known;
     if (!wanted || !found || typeof found === "string" || !found.prints) return null;
     const share = found.met / found.prints;
-    return { ...wanted, reached: `${Math.round(100 * share)} %`, margin: share - wanted.least_yield, met: share >= wanted.least_yield };
+    return { ...wanted, reached: `${Math.round(100 * share)} %`, margin: share - this.leastYield, met: share >= this.leastYield };
   }
+
+  /** Part of the random prints that is to meet all items. */
+  private get leastYield(): number { return this.subject.problem.specification?.tolerances?.least_yield ?? LEAST_YIELD; }
 
   /** Whether the tolerance is known, and hardly any random print misses it. */
   private get hasYield(): boolean {
     const { tolerance } = this.known;
-    return typeof tolerance === "object" && tolerance !== null && tolerance.met >= LEAST_YIELD * tolerance.prints;
+    return typeof tolerance === "object" && tolerance !== null && tolerance.met >= this.leastYield * tolerance.prints;
   }
 
   /** How many random prints meet all items, if the tolerance is known. */
@@ -290,7 +295,7 @@ export class Result {
     const { tolerance } = this.known;
     if (!tolerance) return " Not checked over tolerances.";
     if (tolerance === "running") return " The tolerance is being computed.";
-    return typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} (${Math.round((100 * tolerance.met) / tolerance.prints)} %) ${tolerance.met_words}${tolerance.met < LEAST_YIELD * tolerance.prints ? "; see Tolerance below" : ""}.` : "";
+    return typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} (${Math.round((100 * tolerance.met) / tolerance.prints)} %) ${tolerance.met_words}${tolerance.met < this.leastYield * tolerance.prints ? "; see Tolerance below" : ""}.` : "";
   }
 
   private showTable(): void {
@@ -398,8 +403,8 @@ export class Result {
 
   /** The next step where too few random prints meet all items. */
   private toleranceStep({ met, prints }: ToleranceFound): HTMLElement[] {
-    if (!this.subject.problem.specification || !prints || met >= LEAST_YIELD * prints) return [];
-    return [h("p", { class: "note" }, "Refine over tolerances moves the nodes of this design and changes its widths until the items are met with deviations, too, where that is possible. Random prints include a push that is up to 5° off its direction, unless the task says otherwise."),
+    if (!this.subject.problem.specification || !prints || met >= this.leastYield * prints) return [];
+    return [h("p", { class: "note" }, "Refine over tolerances moves the nodes of this design and changes its widths until the items are met with deviations, too, where that is possible. The direction of the push deviates in random prints, too."),
       button("Refine over tolerances", () => void this.begin({ refine: true, tolerant: true }), "", { "data-key": "refine-tolerant" })];
   }
 
@@ -491,7 +496,7 @@ export class Result {
     const { thickness, scale, material } = this.part;
     const named = typeof material === "string" ? this.registries?.materials.find(({ name }) => name === material)?.title ?? material : material.name;
     const struts = isInSpace(this.subject.problem) ? `Round struts, diameter ${this.strutText()}` : `Struts ${this.strutText()} wide, ${thickness} mm thick`;
-    return h("p", {}, `${struts}, nodes ${scale} mm apart, ${named}. ${this.subject.problem.widths ? "The refinement has changed the widths. " : ""}Another part is another task.`);
+    return h("p", {}, `${struts}, nodes ${scale} mm apart, ${named}. ${"refinement" in this.subject.provenance ? "The refinement has changed the widths. " : ""}Another part is another task.`);
   }
 
   private async describe(): Promise<void> {

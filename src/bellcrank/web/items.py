@@ -43,24 +43,18 @@ def wanted_items(problem: Problem, part: PartSpec) -> list[dict[str, str]]:
         )
     prints = wanted_of_prints(problem)
     if prints is not None:
-        items.append({key: prints[key] for key in ("name", "label", "wanted")})
+        items.append(prints)
     return items
 
 
-def wanted_of_prints(problem: Problem) -> dict[str, Any] | None:
-    """Return what a specification wants of random prints, and of which part of them.
-
-    None without tolerances.
-    """
+def wanted_of_prints(problem: Problem) -> dict[str, str] | None:
+    """Return what a specification wants of random prints; None without tolerances."""
     wanted = problem.specification
     if wanted is None or wanted.tolerances is None:
         return None
     share, keep = wanted.tolerances.least_yield, wanted.tolerances.keep
     found = f"keep {keep:.0%} of the gain" if keep else "meet all items"
-    return {
-        "name": "tolerance", "label": "random prints", "wanted": f"{share:.0%} {found}",
-        "least_yield": share,
-    }  # fmt: skip
+    return {"name": "tolerance", "label": "random prints", "wanted": f"{share:.0%} {found}"}
 
 
 def objective_states(

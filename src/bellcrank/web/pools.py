@@ -26,8 +26,6 @@ T = TypeVar("T")
 
 
 ENDS = "the server has ended"
-SOLID_LIMIT = 7200
-"""Longest time of the finite elements of a body in s."""
 
 
 class Busy(RunFailed):
@@ -258,5 +256,5 @@ def make_pools() -> Pools:
         thorough=Pool(seconds=120, waiting=32, niceness=2),
         files=Pool(seconds=1800, waiting=12, niceness=3, recycle=40, stoppable=True),
         checks=Pool(seconds=1800, waiting=12, niceness=5, recycle=40, stoppable=True),
-        solids=Pool(seconds=SOLID_LIMIT, waiting=12, niceness=5, recycle=40, stoppable=True),
+        solids=Pool(seconds=7200, waiting=12, niceness=5, recycle=40, stoppable=True),
     )

@@ -8,6 +8,7 @@ from typing import Any
 from bellcrank.fem import levels
 from bellcrank.part import materials
 from bellcrank.search import DEFAULT_SEARCH, searches
+from bellcrank.task.schema import ToleranceSection
 from bellcrank.task.space import CELLS
 from bellcrank.web.page_files import page_files
 
@@ -28,11 +29,23 @@ CELL_TITLES = {
 def registered() -> dict[str, list[dict[str, Any]]]:
     """Return searches, materials, file formats, levels and lattices in space as plain data.
 
-    The default search comes first; the other entries are in the order of registration. Each entry
-    has ``name`` and ``title``.
+    ``tolerance`` has the usual deviations, for the fields of a task that are empty. The default
+    search comes first; the other entries are in the order of registration. Each entry has
+    ``name`` and ``title``.
     """
+    usual = ToleranceSection()
     methods = sorted(searches, key=lambda name: name != DEFAULT_SEARCH)
     return {
+        "tolerance": [
+            {"name": name, "title": text}
+            for name, text in (
+                ("width", f"{usual.width:.0%}"),
+                ("each_width", f"{usual.each_width:.0%}"),
+                ("node", f"{usual.node:g} mm"),
+                ("angle", f"{usual.angle:g} degrees"),
+                ("least_yield", f"{usual.least_yield:.0%}"),
+            )
+        ],
         "cells": [{"name": name, "title": CELL_TITLES[name]} for name in CELLS],
         "searches": [
             {

@@ -50,13 +50,13 @@ def list_runs(state: State) -> list[dict[str, Any]]:
 @router.post("", status_code=201)
 async def start_run(body: RunBody, state: State) -> dict[str, str]:
     """Queue a search."""
-    problem, record = await run_in_threadpool(_validated, body)
+    problem, record = await run_in_threadpool(validated, body)
     job = state.jobs.add(problem, record)
     state.scheduler.add(job)
     return {"id": job.name}
 
 
-def _validated(body: RunBody) -> tuple[Problem, Record]:
+def validated(body: RunBody) -> tuple[Problem, Record]:
     """Return problem and record of a request; an invalid one is refused before it is queued."""
     from bellcrank.model import Design, unpack_mask
     from bellcrank.part import PartSpec, frame_problem

@@ -113,10 +113,10 @@ def _search(
                 assert report is not None  # without a request to stop
             except InvalidSettings:
                 return {"kind": "paused", "message": NO_DESIGN_YET}
-            return {"kind": "stopped", **_reached(where)}
+            return {"kind": "stopped", **result_of(where)}
     if report is None:
         return {"kind": "paused"}
-    return {"kind": "finished", **_reached(where)}
+    return {"kind": "finished", **result_of(where)}
 
 
 def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[str, Any]:
@@ -156,10 +156,10 @@ def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[st
     write_design(result, where / "run" / "design.json", overwrite=True)
     message = "" if found.improved else f"the design was not improved: {found.reason}"
     kind = "stopped" if listener.stop.is_set() else "finished"
-    return {"kind": kind, "message": message, **_reached(where)}
+    return {"kind": kind, "message": message, **result_of(where)}
 
 
-def _reached(where: Path) -> dict[str, Any]:
+def result_of(where: Path) -> dict[str, Any]:
     """Return the efficiency of a result, and its objective in words unless it is the efficiency."""
     from bellcrank.fem.results import finite
     from bellcrank.model import read_design
