@@ -34,7 +34,7 @@ def test_every_format_is_written_by_its_suffix(here: Path, name: str) -> None:
     file = f"part{exporters[name].suffixes[0]}"
     outcome = call("export", "human:crane", file, "--plate", "--screws", 2, "--pad", "--moved")
     assert outcome.code == 0, outcome.err
-    assert outcome.err.splitlines()[0] == f"wrote {file}, 5.12 mm thick"
+    assert outcome.err.splitlines()[0] == f"wrote {file}, 122 x 97.26 x 5.12 mm"
     printed = file.endswith((".stl", ".3mf"))
     assert ("whole number of layers" in outcome.err) == printed
     assert list(files(here)) == [file]

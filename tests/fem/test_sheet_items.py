@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
-from bellcrank.fem.specification import sheet_records
+from bellcrank.fem.path import Linearisation, PathStatus, follow_path
+from bellcrank.fem.specification import STEPS, sheet_records
 from bellcrank.mechanics import VERIFICATION_INCREMENT, item_results
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.task import task_from_dict
 from bellcrank.workflows.part_figures import SHEET_QUANTITIES, part_figures, sheet_figures
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 pytest.importorskip("ngsolve")
 
@@ -62,6 +67,45 @@ DEVIATION = {
 """Largest relative deviation of the sheet from the frame; that of the others is `USUAL`. Hubs make
 the sheet stiffer, and corners strain it more."""
 USUAL = 0.25
+
+
+class Spring:
+    """The tangent stiffness of `SofteningSpring`."""
+
+    nonsingular = True
+
+    def __init__(self, value: float) -> None:
+        self.value = value
+        self.negative_eigenvalues = int(value < 0.0)
+
+    def solve(self, right: NDArray[np.float64]) -> NDArray[np.float64]:
+        return right / self.value
+
+
+class SofteningSpring:
+    """A spring whose stiffness falls to a two hundredth of its mean at half the load."""
+
+    count, kinks = 1, ()
+    least = 0.005
+
+    def linearise(self, unknowns: NDArray[np.float64], load: float) -> Linearisation:
+        moved = unknowns - 0.5
+        force = 0.5 + (4.0 * moved**3 + self.least * moved) / (1.0 + self.least)
+        stiffness = (12.0 * moved[0] ** 2 + self.least) / (1.0 + self.least)
+        return Linearisation(force - load, 1e-9, Spring(stiffness))
+
+    def load_derivative(
+        self, unknowns: NDArray[np.float64], load: float, toward: float = 1.0
+    ) -> NDArray[np.float64]:
+        del unknowns, load, toward
+        return np.array([-1.0])
+
+    def distance(self, change: NDArray[np.float64]) -> float:
+        return float(np.abs(change).max())
+
+
+def test_a_path_that_is_nearly_unstable_is_followed_to_its_end() -> None:
+    assert follow_path(SofteningSpring(), STEPS).status is PathStatus.CONVERGED
 
 
 @pytest.mark.slow

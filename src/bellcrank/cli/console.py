@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,16 @@ from bellcrank.provenance import other_version
 if TYPE_CHECKING:
     from bellcrank.model import Problem
 
-results = Console(highlight=False, soft_wrap=True, emoji=False)
+WIDE = 160
+"""Width of tables in files and pipes, in characters."""
+
+
+def _width() -> int | None:
+    """Return the width of standard output: that of the terminal, if it is one (None)."""
+    return None if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE
+
+
+results = Console(highlight=False, soft_wrap=True, emoji=False, width=_width())
 notes = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 
 
@@ -76,6 +86,8 @@ def print_json(text: str) -> None:
 def text_grid(rows: list[list[str]]) -> Table:
     """Return rows of texts as a table; efficiencies and items that are missed are bold."""
     grid = Table.grid(padding=(0, 2))
+    for _ in rows[0]:
+        grid.add_column(overflow="fold")
     for name, *values in rows:
         bold = name.startswith("efficiency (") or "NO" in values
         grid.add_row(

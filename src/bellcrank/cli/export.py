@@ -138,7 +138,7 @@ def export(
     from bellcrank.model.storage import check_folder
     from bellcrank.part import read_length
     from bellcrank.workflows import spec_for
-    from bellcrank.workflows.fabricate import bundle_of
+    from bellcrank.workflows.fabricate import bundle_of, size_and_volume
 
     exporters.for_path(out).check_installed()
     chosen = design_named(design)
@@ -166,8 +166,8 @@ def export(
         printed_width=1.0 if ratio is None else ratio,
     )  # fmt: skip
     write(bundle, out, overwrite=overwrite)
-    direction = "high" if bundle.part.dimension == 3 else "thick"
-    notes.print(f"wrote {plain(out)}, {bundle.thickness:.4g} mm {direction}")
+    size_text = " x ".join(f"{side:.4g}" for side in size_and_volume(bundle)[0])
+    notes.print(f"wrote {plain(out)}, {size_text} mm")
     if markers:
         from bellcrank.workflows.markers import write_markers
 

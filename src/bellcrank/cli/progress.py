@@ -62,6 +62,8 @@ class SearchProgress(Live):
         """Show the number of candidates that have been verified, and the largest number."""
         self._bar.update(self._task, description="verifying")
         figures = f"verified candidates: {done} of at most {total}"
+        if not done:
+            figures = f"at most {total} candidates"
         self._show(done, total, figures, figures)
 
     def refining(self, number: int, step: RefinementStep) -> None:

@@ -80,7 +80,9 @@ def tolerance(
     ] = None,
     picture: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Draw the map of critical struts (png, svg, pdf)."),
+        typer.Option(
+            metavar="FILE", help="Draw the critical struts (png, svg, pdf); not with --no-struts."
+        ),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace existing files.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,

@@ -82,7 +82,11 @@ def validate(
     linear: Annotated[bool, typer.Option("--linear", help="Assume small displacements.")] = False,
     elements: Annotated[int, typer.Option(help="Number of beam elements of each strut.")] = 8,
     size: Annotated[
-        str | None, typer.Option(help="Largest edge of plane and solid elements (for example 1mm).")
+        str | None,
+        typer.Option(
+            help="Largest edge of plane and solid elements, such as 0.7mm; default in the plane: "
+            "half of the strut width."
+        ),
     ] = None,
     part: PartFile = None,
     width: Width = None,
@@ -309,9 +313,9 @@ def _print(validation: Validation) -> None:
     names = (
         f"efficiency ({objective_name(problem)})",
         "output, mm",
-        "off-axis motion",
-        "rotation",
-        "force, N",
+        "off-axis motion at full stroke",
+        "rotation at full stroke",
+        "force at full stroke, N",
         "stress, MPa",
         "strain",
         "status",

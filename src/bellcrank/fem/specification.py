@@ -44,8 +44,8 @@ if TYPE_CHECKING:
 
     Values = NDArray[np.float64]
 
-STEPS = StepControl(first=0.125, largest=0.125, smallest=1e-3)
-ROUGH_STEPS = StepControl(first=0.125, largest=0.125, smallest=1e-2, factorisations=100)
+STEPS = StepControl(first=0.125)
+ROUGH_STEPS = StepControl(first=0.125, smallest=1e-2, factorisations=100)
 """For coarse meshes: paths that need smaller or more steps count as unstable; most need 40 to 60
 factorisations."""
 STATES = 16

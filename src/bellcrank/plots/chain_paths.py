@@ -115,6 +115,8 @@ class PathOptions:
     human_efficiency, final_efficiency
         Efficiencies of the human design and of the final design after the removal of unloaded
         beams, drawn as horizontal lines.
+    is_refined
+        Whether the final design is a refined one.
     best
         Chain and index of the selected design; by default the design with the largest
         efficiency is marked.
@@ -128,6 +130,7 @@ class PathOptions:
     annealing_steps: int = 0
     human_efficiency: float | None = None
     final_efficiency: float | None = None
+    is_refined: bool = False
     best: tuple[int, int] | None = None
     axis: Axis = "accepted"
     measure: str = "efficiency"
@@ -237,7 +240,11 @@ def _levels(options: PathOptions) -> list[tuple[float, LineStyle, str]]:
     """Return value, style and label of the horizontal lines."""
     lines = (
         (options.human_efficiency, HUMAN_LINE, "human design"),
-        (options.final_efficiency, FINAL_LINE, "final design"),
+        (
+            options.final_efficiency,
+            FINAL_LINE,
+            "refined design" if options.is_refined else "final design",
+        ),
     )
     return [
         (v, line_style, label) for v, line_style, label in lines if v is not None and np.isfinite(v)

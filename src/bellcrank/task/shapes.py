@@ -27,8 +27,9 @@ REGIONS = {2: ("point", "edge", "nodes", *SHAPES[2]), 3: ("point", "face", "node
 """Regions of nodes in the plane and in space."""
 ROUND = ("circle", "sphere", "cylinder")
 """Shapes with a radius."""
-SNAP = 0.75
-"""Largest distance of a node from the point that it is named by, in spacings."""
+SNAP = 1.25
+"""Largest distance of a node from the point that it is named by, in spacings. The nearest node to a
+corner of a domain may be one spacing away: every other row begins half a spacing later."""
 SIDES = {
     2: {"left": (0, 0.55), "right": (0, 0.55), "bottom": (1, 0.3), "top": (1, 0.3)},
     3: {

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from bellcrank.fem.results import finite
 from bellcrank.model import CARRIED
-from bellcrank.part.units import GRAVITY
 from bellcrank.task import units_of
 from bellcrank.workflows.specification import item_label, number_text, shown_value, wanted_text
 
@@ -83,7 +82,7 @@ def item_states(
         states.append(
             {
                 **_texts(each.item, problem, units),
-                "reached": number_text(each.item, value, units) + _grams(each.item, value, units),
+                "reached": number_text(each.item, value, units),
                 "margin": finite(each.margin) if math.isfinite(value) else None,
                 "met": bool(each.met),
             }
@@ -97,12 +96,5 @@ def _texts(item: Item, problem: Problem, units: ProblemUnits) -> dict[str, str]:
     return {
         "name": item.name,
         "label": item_label(item, problem),
-        "wanted": wanted_text(item, units) + _grams(item, item.at_least, units) + halved,
+        "wanted": wanted_text(item, units) + halved,
     }
-
-
-def _grams(item: Item, value: float | None, units: ProblemUnits) -> str:
-    """Return a load as a mass in brackets; empty for other quantities."""
-    if item.quantity not in CARRIED or value is None or not math.isfinite(value):
-        return ""
-    return f" ({1000.0 * units.in_part('force', value) / GRAVITY:.3g} g)"

@@ -36,8 +36,8 @@ def figure_table(report: DesignReport, number: str = "{:.4f}") -> list[list[str]
         efficiencies.append(verified)
     rows = [["", *models], [f"efficiency ({objective_name(problem)})", *efficiencies]]
     for name, key, form in (
-        ("off-axis motion", "off_axis", "{:.1%}"),
-        ("rotation of the output", "output_rotation_deg", "{:.1f} deg"),
+        ("off-axis motion at full stroke", "off_axis", "{:.1%}"),
+        ("rotation at full stroke", "output_rotation_deg", "{:.1f} deg"),
     ):
         rows.append([name, *(figure_text(each[key], form) for each in report.figures)])
     if not report.part_figures:  # they have the force along the input
@@ -127,10 +127,13 @@ def part_figure_table(report: DesignReport) -> list[list[str]]:
     texts_of = [dict(figure_texts(row)) for row in found]
     rows += [[label, *(texts[label] for texts in texts_of)] for label, *_ in FIGURES]
     points = [row.get("limit_points") or [] for row in found]
-    texts = [", ".join(f"{point:.0%}" for point in each) or "none" for each in points]
+    texts = [
+        f"at {', '.join(f'{point:.0%}' for point in each)} of the stroke" if each else "none"
+        for each in points
+    ]
     cycles = [_cycle_text(report, row.get("strain_amplitude")) for row in found]
     return [
-        *rows, ["limit points of the force", *texts], ["strain amplitude in cycles", *cycles]
+        *rows, ["extremes of the input force", *texts], ["strain amplitude in cycles", *cycles]
     ]  # fmt: skip
 
 

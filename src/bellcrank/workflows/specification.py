@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bellcrank.fem.results import finite
 from bellcrank.mechanics import VERIFICATION_INCREMENT
 from bellcrank.model import CARRIED, QUANTITIES
+from bellcrank.part.units import GRAVITY
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.task import NAMES, units_of
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 ROUNDING = 1e-9
 """Size below which a number is written as 0: rounding of symmetric designs."""
 
+UNSTABLE = "unstable"
+"""Text for a value that does not exist, since the part is not stable up to the full stroke."""
 LABELS = {
     "off_axis": "off-axis motion", "path_error": "path error", "blocked_force": "blocked force",
     "input_force": "input force", "stable_stroke": "stable stroke",
@@ -55,9 +58,10 @@ def item_label(item: Item, problem: Problem) -> str:
 
 
 def number_text(item: Item, value: float, units: ProblemUnits) -> str:
-    """Return a value of the quantity of an item with its unit.
+    """Return a value of the quantity of an item with its unit; a load as a mass, too.
 
-    An infinite value is one above the lower bound, which is not always determined.
+    An infinite value is one above the lower bound, which is not always determined; an unknown one
+    means that the motion under the load of the item is not stable.
 
     Examples
     --------
@@ -66,17 +70,20 @@ def number_text(item: Item, value: float, units: ProblemUnits) -> str:
     >>> units = ProblemUnits(length=10.0, force=12.0)
     >>> number_text(Item(quantity="off_axis", at_most=0.1), 0.0321, units)
     '3.21 %'
+    >>> number_text(Item(quantity="dead_load", at_least=0.01), float("nan"), units)
+    'unstable'
     """
     if value == math.inf:
         return "more" if item.at_least is None else f"> {number_text(item, item.at_least, units)}"
     if not math.isfinite(value):
-        return "-"
+        return UNSTABLE
     unit = _unit(item)
     number = 100.0 * value if unit == "%" else value
     number = units.in_part(dimension_of(item), number)
     if abs(number) < ROUNDING:
         number = 0.0
-    return f"{number:.3g} {unit}".rstrip()
+    mass = f" ({1e3 * number / GRAVITY:.3g} g)" if item.quantity in CARRIED else ""
+    return f"{number:.3g} {unit}".rstrip() + mass
 
 
 def wanted_text(item: Item, units: ProblemUnits) -> str:

@@ -309,11 +309,18 @@ def tolerance_sentence(report: ToleranceReport) -> str:
     tolerance = report.tolerance
     sentence = (
         f"{len(tolerance.scenarios)} scenarios, by frames with one element in each strut; the "
-        "worst value of each kind, with * if it does not meet its item"
+        "worst value of each kind, with * if it does not meet its item (at other strokes, items do "
+        f"not count), '{LOST}' if the part is not stable up to the full stroke or cannot be made"
     )
     if prints := tolerance.of_kind("print"):
         met = sum(tolerance.results[number].met for number in prints)
-        sentence += f"; {met} of {len(prints)} random prints {met_words(report)}"
+        sizes = report.deviations.tolerances
+        sentence += (
+            f"; {met} of {len(prints)} random prints {met_words(report)}: widths up to "
+            f"{sizes.width:.0%} off, each with a standard deviation of {sizes.each_width:.0%}, "
+            f"nodes up to {report.spec.scale * sizes.node:.2g} mm off, inputs turned by up to "
+            f"{sizes.angle:g} degrees"
+        )
     return sentence
 
 
