@@ -212,3 +212,20 @@ def test_the_force_of_a_displacement_drive_gives_that_displacement(
     assert (moved.status.label, response.status.label) == ("converged", "converged")
     assert response.displacement == pytest.approx(moved.displacement, abs=1e-7)
     assert response.energy == pytest.approx(moved.energy, rel=1e-8)
+
+
+@BOTH
+def test_a_dead_end_carries_nothing_but_its_own_weight(dimension: int) -> None:
+    plain = pushed(bar(dimension), "displacement", 0.5)
+    more = np.zeros((1, dimension))
+    more[0, :2] = 2.0, 1.0
+    weight = np.zeros(dimension)
+    weight[1] = -1e-4
+    problem = with_more(plain, more, [[2, 5]])
+    problem = replace(problem, loads=replace(problem.loads, weight=weight))
+    evaluator = FrameEvaluator(problem)
+    assert evaluator.load_bearing(all_of(problem)).tolist() == [True] * 4 + [False]
+    # The weight of the dead end bends the bar nevertheless.
+    with_end = evaluator.evaluate(all_of(problem)).displacement[2]
+    without = evaluator.evaluate(np.arange(5) < 4).displacement[2]
+    assert with_end[1] < without[1]

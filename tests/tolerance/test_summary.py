@@ -71,3 +71,15 @@ def test_losses_of_struts_are_parts_of_the_efficiency() -> None:
     )  # fmt: skip
     assert found.strut_losses() == {1: 0.25, 2: 1.25, 3: math.inf}
     assert found.kinds == ["strut"]
+
+
+def test_losses_of_struts_are_parts_of_a_rotation_that_is_maximised() -> None:
+    turn = ObjectiveTerm(quantity="rotation", case="push", output="tip")
+    names = ("nominal", "strut")
+    scenarios = [
+        Scenario(name=name, kind=name, missing=1 if name == "strut" else None) for name in names
+    ]
+    results = [ScenarioResult("converged", 0.9, [], [angle]) for angle in (60.0, 15.0)]
+    found = Tolerance(scenarios, results, [turn])
+    assert found.measure == "rotation"
+    assert found.strut_losses() == {1: 0.75}

@@ -43,7 +43,7 @@ def test_every_load_of_a_task_is_listed() -> None:
     )  # fmt: skip
     assert condition_texts(task.problem, task.part) == [
         "input 3 mm up",
-        "load of 0.05 N at 30 deg on 2 nodes, grows with the input",
+        "load of 0.05 N in all at 30 deg on 2 nodes, grows with the input",
         "spring of 0.1 N/mm at 1 node, right",
         "own weight down, grows with the input",
         "spring of 0.2 N/mm against output",

@@ -17,8 +17,10 @@ from bellcrank.refine.refinement import Progress
 from bellcrank.refine.state import State
 from bellcrank.search.selection import Candidate, Finalist, Selection
 from bellcrank.task import find_task
+from bellcrank.web.refinement_progress import RefinementReporter
 from bellcrank.workflows import refinement
-from bellcrank.workflows.refinement import BATCHES, refine_selection
+from bellcrank.workflows.refinement import BATCHES, refine_selection, with_refined
+from bellcrank.workflows.refiners import GeometryCount
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -135,3 +137,47 @@ def test_the_reserve_is_refined_only_if_no_other_design_meets_all_items(
     assert (found.design.efficiency == 2.0) == is_refined
     # Designs of the reserve have numbers of their own.
     assert (max(reported) >= 1 + len(given.others)) == is_refined
+
+
+@pytest.mark.parametrize(
+    ("faults", "chosen"),
+    [
+        ([0.4, 0.2, 0.3], 1),
+        ([0.4, 0.5, 0.6], 0),
+        ([0.4, 0.2, 0.0], 2),
+        ([0.0, 0.2, 0.3], 0),
+    ],
+    ids=["nearest", "the search is nearest", "met", "the search meets them"],
+)
+def test_a_stopped_refinement_leaves_the_design_nearest_to_the_items(
+    monkeypatch: pytest.MonkeyPatch, faults: list[float], chosen: int
+) -> None:
+    given = selection()
+    designs = [given.design, *(replace(given.design, efficiency=float(k)) for k in (1, 2))]
+
+    def verified(finalist: Finalist, design: Design) -> Finalist:
+        (own,) = (fault for fault, each in zip(faults, designs, strict=True) if each is design)
+        items = [ItemResult(ITEM, 1.0 - own, own, -own)]
+        found: Any = SimpleNamespace(fault="missed" if own else None, is_stable=True, items=items)
+        return replace(finalist, design=design, verification=found, items=tuple(items))
+
+    monkeypatch.setattr(refinement, "_verified", verified)
+    assert with_refined(given, designs[1:]).design is designs[chosen]
+
+
+def test_the_geometry_that_is_shown_is_the_nearest_until_one_meets_all_items() -> None:
+    design = selection().design
+    reporter = RefinementReporter(PartSpec(), GeometryCount(), only_met=True)
+    shown = []
+    for number, violation, objective in (
+        (0, 0.5, 3.0), (1, 0.2, 2.0), (0, 0.4, 5.0), (0, 0.0, 1.0), (1, 0.1, 9.0), (1, 0.0, 2.0),
+    ):  # fmt: skip
+        rows: Any = SimpleNamespace(violation=violation, objective=objective)
+        own = replace(design, efficiency=objective)
+        progress: Any = SimpleNamespace(rows=rows, design=own, evaluations=1, sheets=0)
+        reporter.add(number, progress)
+        shown.append(None if reporter.design is None else reporter.design.efficiency)
+        reporter.only_met = False
+    # The first one is not shown beside a design that meets all items.
+    assert shown == [None, 2.0, 2.0, 1.0, 1.0, 2.0]
+    assert [each.efficiency for each in reporter.designs()] == [2.0, 1.0]

@@ -88,7 +88,7 @@ export interface PartReport {
 }
 
 /** A part over tolerances: rows of texts, and what the loss of each strut costs. */
-export interface ToleranceFound { sentence: string; prints: number; met: number; /** Deviations in words. */ deviations: string; /** What these prints do: meet all items, or keep a part of the efficiency. */ met_words: string; rows: string[][]; losses: { beams: number[]; cost: (number | null)[] } }
+export interface ToleranceFound { sentence: string; prints: number; met: number; /** Deviations in words. */ deviations: string; /** What these prints do: meet all items, or keep a part of the efficiency. */ met_words: string; rows: string[][]; losses: { measure?: string; beams: number[]; cost: (number | null)[] } }
 
 export interface Response {
   status: string;

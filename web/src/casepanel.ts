@@ -39,6 +39,22 @@ const MINIMISED: string[] = ["off_axis", "sag"];
 const TURN = { direction: undefined, gain: undefined, travel: undefined, off_axis: undefined, path: undefined, payload: undefined, dead_load: undefined, sag: undefined, rotation: [{ maximise: true }] };
 const MOTION = { direction: "left", rotation: undefined, gain: [{ maximise: true }], off_axis: [{ at_most: "10%" }] };
 
+/** Outputs as they were before another motion was chosen, so that a return to it loses nothing. */
+const BEFORE = new WeakMap<TaskEditor, Map<string, OutputTable>>();
+
+/** What changes when an output is to turn instead of moving, or to move instead of turning. */
+function otherMotion(editor: TaskEditor, { index }: Target, each: OutputTable, picked: "moves" | "turns"): Record<string, unknown> {
+  const known = BEFORE.get(editor) ?? new Map<string, OutputTable>();
+  BEFORE.set(editor, known);
+  const key = (motion: string): string => JSON.stringify([motion, editor.loadCase, index, each.at]);
+  const before = known.get(key(picked));
+  known.set(key(isTurn(each) ? "turns" : "moves"), each);
+  const usual: Record<string, unknown> = picked === "turns" ? TURN : MOTION;
+  if (!before) return usual;
+  const { at: _at, name: _name, ...fields } = before;
+  return { ...Object.fromEntries(Object.keys(TURN).map((field) => [field, undefined])), ...fields };
+}
+
 /** The panel of the inputs, outputs or loads of the shown load case. */
 export function casePanel(editor: TaskEditor, kind: "inputs" | "outputs" | "loads"): HTMLElement {
   const sections = sectionsOf(editor.task.table, editor.loadCase, kind);
@@ -241,7 +257,7 @@ function outputFields(editor: TaskEditor, each: OutputTable, target: Target): Ch
   add.setAttribute("aria-label", "Ask for");
   return [
     ...(several ? [amount(`${key}-name`, "Name", each.name, "", (value) => set(editor, target, { name: value === undefined ? undefined : String(value) }))] : []),
-    choice("Motion of the output", [["moves", "moves"], ["turns", "turns"]] as ["moves" | "turns", string][], turns ? "turns" : "moves", (picked) => set(editor, target, picked === "turns" ? TURN : MOTION), `motion-${target.index}`),
+    choice("Motion of the output", [["moves", "moves"], ["turns", "turns"]] as ["moves" | "turns", string][], turns ? "turns" : "moves", (picked) => set(editor, target, otherMotion(editor, target, each, picked)), `motion-${target.index}`),
     turns && h("p", { class: "note" }, isSpatial(editor.task.table) ? ROTATION_IN_SPACE : "The mean rotation of its nodes counts: counter-clockwise is positive."),
     // The direction of an output that turns matters for its off-axis motion alone.
     (!turns || each.off_axis) && directionFields(editor, target, each.direction ?? "up"),

@@ -241,7 +241,8 @@ export class Panels {
         editor.aimAt({ kind: "supports", index: editor.supportIndex() });
       }),
       h("div", { class: "row between" }, h("label", { class: "tick" }, rows, isSpatial(editor.task.table) ? "Whole layers" : "Whole rows"),
-        button("Clear", clearAll, "quiet", { disabled: !editor.task.table.supports?.length, "data-key": "clear-supports" })));
+        button("Clear", clearAll, "quiet", { disabled: !editor.task.table.supports?.length, "data-key": "clear-supports" })),
+      !isSpatial(editor.task.table) && h("p", { class: "note" }, "A plate with screw holes can be added to the supports under Download of the result. At an edge it lies outside the domain and makes the part larger."));
   }
 
   private limitsSummary(): string {

@@ -113,7 +113,9 @@ export class Player {
   }
 
   private colours(): HTMLElement {
-    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ["sensitivity", "Sensitivity"], ...(isInSpace(this.problem) ? [] : [["stress", "Stress"]]), ...(this.losses ? [["loss", "Loss of struts"]] : [])] as [Colour, string][],
+    // The sensitivity is that of output / input motion.
+    const maximised = this.problem.specification?.maximise?.[0]?.quantity;
+    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ...(maximised === "rotation" ? [] : [["sensitivity", "Sensitivity"]]), ...(isInSpace(this.problem) ? [] : [["stress", "Stress"]]), ...(this.losses ? [["loss", "Loss of struts"]] : [])] as [Colour, string][],
       this.colour, (picked) => this.paint(picked));
   }
 
@@ -138,8 +140,8 @@ export class Player {
   }
 
   /** Colour the struts by what the loss of each costs. */
-  showLosses({ beams, cost }: ToleranceFound["losses"]): void {
-    this.losses = { beams, cost };
+  showLosses(losses: ToleranceFound["losses"]): void {
+    this.losses = losses;
     const bar = this.element.querySelector(".colour");
     if (bar && !bar.querySelector('input[value="loss"]')) bar.firstElementChild!.replaceWith(this.colours());
   }
@@ -345,7 +347,7 @@ export class Player {
       plain: "Grey: at rest. Orange: input. Blue: output.",
       energy: "Strain energy of each beam, increasing from pale to red.",
       sensitivity: this.sensitivity ? (this.legend.dataset.beam || "Dark: removal lowers the efficiency most. Dashed: addition raises it. Point at a beam for its values.") : "Evaluating the removal of each beam …",
-      loss: "The loss of a strut costs: pale up to 10 % of the efficiency, then up to 30 %, up to 50 %, darkest more. Violet: the full stroke is not reached without it.",
+      loss: `The loss of a strut costs: pale up to 10 % of the ${this.losses?.measure ?? "efficiency"}, then up to 30 %, up to 50 %, darkest more. Violet: the full stroke is not reached without it.`,
       stress: this.picture ? `Von Mises stress, up to ${figure(Math.max(...sample(this.picture.stress)), 2)} MPa.` : "Check with finite elements to compute the stress.",
     };
     const touching = this.touching.size && (this.colour === "plain" || this.colour === "energy") ? ` Bright red: ${this.touching.size} struts touch others along the stroke; a bound on the clearance does not count struts that meet in a node.` : "";

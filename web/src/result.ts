@@ -239,10 +239,11 @@ export class Result {
     const solid = typeof found === "object" ? found : null;
     const first = report.figures[0];
     const objective = otherObjective(report.objectives);
+    const isRotation = objective?.quantity === "rotation";
     clear(this.headline, h("strong", {}, objective?.reached ?? figure(first?.efficiency, 2)),
       h("span", {}, h("b", { class: "model" }, FRAMES), h("br"),
         `${objective ? sentence(objective.label).slice(0, -1) : "Output / input motion"} of the part with ${this.strutText()} struts`,
-        solid?.efficiency != null && h("span", {}, h("br"), `${figure(solid.efficiency, 2)} as output / input motion in ${words}`)));
+        solid?.efficiency != null && h("span", {}, h("br"), isRotation ? `${figure(solid.output_rotation_deg, 1)}° in ${words}` : `${figure(solid.efficiency, 2)} as output / input motion in ${words}`)));
     const columns: Column[] = [];
     // The model of the search is that of the frames, with fewer elements.
     if (report.items.frames) columns.push({ title: "frames", items: report.items.frames });
@@ -298,18 +299,24 @@ export class Result {
     return typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} (${Math.round((100 * tolerance.met) / tolerance.prints)} %) ${tolerance.met_words}${tolerance.met < this.leastYield * tolerance.prints ? "; see Tolerance below" : ""}.` : "";
   }
 
+  /** Whether nodes and widths are those of a refinement; also of one that was stopped. */
+  private get isRefined(): boolean { return "refinement" in this.subject.provenance || Boolean(this.subject.problem.widths); }
+
+  /** Whether the rotation of the output is what counts. */
+  private get turns(): boolean { return this.subject.problem.specification?.maximise?.[0]?.quantity === "rotation"; }
+
   private showTable(): void {
     this.showReport();
     this.fileNote.textContent = this.unchecked;
     const { efficiency, comparison, mask } = this.subject;
     const beams = bitsOf(mask, this.subject.problem.beams.length).reduce((a, b) => a + b, 0);
     const rows: (HTMLElement | null)[] = [
-      h("tr", {}, h("th", { scope: "row" }, this.subject.problem.section ? "As searched" : "Spring model"), h("td", {}, figure(efficiency, 3)), h("td", { class: "more" }, this.subject.problem.section ? count(beams, "strut") : `${beams} beams`)),
+      h("tr", {}, h("th", { scope: "row" }, this.subject.problem.section ? "As searched" : "Spring model"), h("td", {}, this.turns ? "" : figure(efficiency, 3)), h("td", { class: "more" }, this.subject.problem.section ? count(beams, "strut") : `${beams} beams`)),
       comparison && h("tr", {}, h("th", { scope: "row" }, comparison.title === "yours" ? "Your design" : "Drawn by hand"), h("td", {}, figure(comparison.efficiency, 3)),
         h("td", { class: "more" }, comparison.efficiency && efficiency && comparison.efficiency > 0 && efficiency > comparison.efficiency ? `${figure(comparison.efficiency / efficiency, 2)} of the result` : "")),
       ...(this.registries?.levels ?? []).filter(this.isOffered).map((level) => this.femRow(level)),
     ];
-    clear(this.table, h("caption", {}, "Output / input motion by model"), h("tbody", {}, ...rows));
+    clear(this.table, h("caption", {}, this.turns ? "Rotation of the output by model, at full stroke" : "Output / input motion by model, at full stroke"), h("tbody", {}, ...rows));
   }
 
   private femRow({ name, title, duration, missing }: Registries["levels"][number]): HTMLElement {
@@ -323,14 +330,14 @@ export class Result {
     if (typeof known === "string") return h("tr", {}, heading, h("td", { colspan: 2, class: "fault" }, known));
     const figures = [
       known.off_axis === null ? "" : `${figure(100 * known.off_axis, 0)} % off-axis`,
-      known.output_rotation_deg === null ? "" : `${figure(known.output_rotation_deg, 1)}° rotation`,
+      known.output_rotation_deg === null || this.turns ? "" : `${figure(known.output_rotation_deg, 1)}° rotation`,
       known.von_mises_MPa === null ? "" : `${figure(known.von_mises_MPa, 2)} MPa`,
       known.principal_strain === null ? "" : `${figure(100 * known.principal_strain, 0)} % strain`,
     ].filter(Boolean).join(", ");
     // Warnings of the frame are shown below the headline.
     const details = known.efficiency === null ? sentence(known.status) : figures;
     const text = [details, ...(name === "frame" ? [] : known.warnings.map(sentence))].filter(Boolean).join(" ");
-    return h("tr", {}, heading, h("td", {}, figure(known.efficiency, 3)), h("td", { class: "more" }, text,
+    return h("tr", {}, heading, h("td", {}, this.turns ? `${figure(known.output_rotation_deg, 1)}°` : figure(known.efficiency, 3)), h("td", { class: "more" }, text,
       known.picture && h("span", {}, " ", button("Show stress", () => this.player.showStress(known.picture), "quiet small"))));
   }
 
@@ -390,8 +397,8 @@ export class Result {
     // The panel is narrow: the worst values of each item are a line below it.
     const first = ["drawn", "95 %", "yield"];
     const worst = head!.map((name, k) => ({ name, k })).filter(({ name }) => ![...first, "item", "wanted"].includes(name));
-    clear(this.toleranceBox, h("p", {}, sentence(tolerance.sentence)),
-      h("p", { class: "note" }, `95 %: the value that 95 of 100 random prints reach. Yield: the part of the prints that meet an item. Worst values are those for ${tolerance.deviations}, and of the prints. “lost”: the part does not reach the full stroke.`),
+    clear(this.toleranceBox, h("ul", { class: "plain" }, ...tolerance.sentence.split("; ").map((text) => h("li", {}, sentence(text)))),
+      h("p", { class: "note" }, `95 %: the value that 95 of 100 random prints reach. Yield: the part of the prints that meet an item. Worst values are those for ${tolerance.deviations}, and of the prints.`),
       h("table", { class: "items tolerance" }, h("caption", {}, "Values as drawn, and in the scenarios"),
         h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "item"), ...first.map((name) => h("th", { scope: "col" }, name)))),
         ...rows.map((row) => h("tbody", {},
@@ -408,10 +415,10 @@ export class Result {
       button("Refine over tolerances", () => void this.begin({ refine: true, tolerant: true }), "", { "data-key": "refine-tolerant" })];
   }
 
-  private lossText({ cost }: ToleranceFound["losses"]): HTMLElement {
+  private lossText({ measure = "efficiency", cost }: ToleranceFound["losses"]): HTMLElement {
     const needed = cost.filter((each) => each === null).length;
     const half = cost.filter((each) => each !== null && each > 0.5).length;
-    return h("p", { class: "note" }, `Of ${cost.length} struts that are not between two supports, ${needed} are needed to reach the full stroke, and the loss of ${half} others costs more than half of the efficiency. “Loss of struts” in the drawing colours them.`);
+    return h("p", { class: "note" }, `Of ${cost.length} struts that are not between two supports, ${needed} are needed to reach the full stroke, and the loss of ${half} others costs more than half of the ${measure}. “Loss of struts” in the drawing colours them.`);
   }
 
   private showPart(fault = ""): void {
@@ -496,7 +503,7 @@ export class Result {
     const { thickness, scale, material } = this.part;
     const named = typeof material === "string" ? this.registries?.materials.find(({ name }) => name === material)?.title ?? material : material.name;
     const struts = isInSpace(this.subject.problem) ? `Round struts, diameter ${this.strutText()}` : `Struts ${this.strutText()} wide, ${thickness} mm thick`;
-    return h("p", {}, `${struts}, nodes ${scale} mm apart, ${named}. ${"refinement" in this.subject.provenance ? "The refinement has changed the widths. " : ""}Another part is another task.`);
+    return h("p", {}, `${struts}, nodes ${scale} mm apart, ${named}. ${this.isRefined ? "The refinement has changed the widths. " : ""}Another part is another task.`);
   }
 
   private async describe(): Promise<void> {
@@ -635,7 +642,8 @@ export class Result {
       button("Open its task", () => void open(false)),
       button("Change by hand", () => void open(true))),
       h("p", { class: "note content" }, problem.specification ? "Refine moves the nodes of this design and changes its widths until it meets all items with a larger objective. " : "",
-        "Search on begins a new search with this design. Both keep this one."),
+        "Search on begins a new search with this design. Both keep this one.",
+        this.isRefined ? " Change by hand shows these struts on the nodes of the task, with its widths: as they were before the refinement." : ""),
       place && h("div", { class: "content" }, field("Compare with", others)));
   }
 
@@ -643,7 +651,7 @@ export class Result {
   private async begin({ refine = false, tolerant = false }: { refine?: boolean; tolerant?: boolean }): Promise<void> {
     const { problem, mask, title, provenance } = this.subject;
     // The struts of a refined design belong to its own nodes, not to those of its task.
-    const task = refine || "refinement" in provenance ? null : this.subject.task ?? provenance["task"] ?? null;
+    const task = refine || this.isRefined ? null : this.subject.task ?? provenance["task"] ?? null;
     try {
       const { id } = await post<{ id: string }>("/runs", {
         title: `${title.replace(/, (refined|searched on)$/, "")}, ${refine ? "refined" : "searched on"}`.slice(-120), session: session(), start: mask, refine, tolerant,

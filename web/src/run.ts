@@ -217,7 +217,7 @@ export class RunPage {
     bar.value = share;
     clear(this.live.querySelector("dl")!, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
     const reached = this.update?.moved?.items;
-    clear(this.items, !this.result && reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by the ${this.update!.moved!.problem ? "best refined design so far" : "best design so far, before refinement"}.`),
+    clear(this.items, !this.result && reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by the ${this.update!.moved!.problem ? "best refined design so far" : "best design so far, before refinement"}${reached.every(({ met }) => met) && run.status === "running" ? "; “Stop and choose the best” is possible" : ""}.`),
       !this.result && reached && itemTable([{ title: "frames", items: reached }]));
     if (run.message && run.status !== "running") this.showMessage(run);
     if (!this.result) {

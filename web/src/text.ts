@@ -57,7 +57,8 @@ export const REMEDIES = [
   "Refine the design (Next steps): nodes and widths change until the items are met in the printed outline, too.",
   "Search longer: Thorough, or more chains.",
   "Let the search decide on more struts: fewer supports, fewer struts that are kept, no symmetry.",
-  "Reduce the requirement: a shorter stroke, or an output closer to the input.",
+  "Give the part more room: a larger domain, or a smaller spacing of nodes with thinner struts.",
+  "Reduce the requirement: less motion of the output, wider bounds, or an output closer to the input.",
 ];
 
 /** Message of a search without the options of the command line. */

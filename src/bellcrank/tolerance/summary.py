@@ -144,15 +144,25 @@ class Tolerance:
                 share = float(np.mean([met[k] for k in prints]))
         return Row(quantity, values[0], worst, percentile, share)
 
+    @property
+    def measure(self) -> str:
+        """Quantity that the loss of a strut reduces: a rotation to be maximised, or efficiency."""
+        first = self.objectives[0].quantity if self.objectives else ""
+        return "rotation" if first == "rotation" else "efficiency"
+
     def strut_losses(self) -> dict[int, float]:
-        """Return the part of the efficiency that the loss of each strut costs.
+        """Return the part of `measure` that the loss of each strut costs.
 
         Infinite where the full stroke is not reached; above 1 where the motion is reversed.
         """
+        nominal = self._measured(self.nominal)
         losses = {}
         for k in self.of_kind("strut"):
             scenario, result = self.scenarios[k], self.results[k]
             assert scenario.missing is not None
-            ratio = result.efficiency / self.nominal.efficiency
+            ratio = self._measured(result) / nominal
             losses[scenario.missing] = 1.0 - ratio if result.is_stable else math.inf
         return losses
+
+    def _measured(self, result: ScenarioResult) -> float:
+        return result.objectives[0] if self.measure == "rotation" else result.efficiency

@@ -27,7 +27,7 @@ class RefinementReporter:
     count
         Count of their geometries.
     only_met
-        Whether a geometry is shown only if it meets all items.
+        Whether a geometry is shown only if it meets all items, as the design before does.
 
     Attributes
     ----------
@@ -37,9 +37,11 @@ class RefinementReporter:
 
     def __init__(self, part: PartSpec, count: GeometryCount, *, only_met: bool = True) -> None:
         self.design: Design | None = None
-        self._part, self._count, self._only_met = part, count, only_met
+        self.only_met = only_met
+        self._part, self._count = part, count
         self._latest: dict[int, RefinementProgress] = {}
         self._best: dict[int, RefinementProgress] = {}
+        self._nearest: dict[int, RefinementProgress] = {}
         self._sent: Design | None = None
         self._sent_at = 0.0
 
@@ -50,18 +52,26 @@ class RefinementReporter:
         self._latest[number] = progress
         self._count.add(number, progress.evaluations)
         if progress.rows.violation > MET:
-            if not self._only_met and not self._best:
-                self.design = progress.design
-            return
-        best = self._best.get(number)
-        if best is None or progress.rows.objective > best.rows.objective:
-            self._best[number] = progress
-            self.design = self.designs()[0]
+            near = self._nearest.get(number)
+            if near is None or progress.rows.violation < near.rows.violation:
+                self._nearest[number] = progress
+        else:
+            best = self._best.get(number)
+            if best is None or progress.rows.objective > best.rows.objective:
+                self._best[number] = progress
+        shown = self.designs() if self._best or not self.only_met else []
+        if shown:
+            self.design = shown[0]
 
     def designs(self) -> list[Design]:
-        """Return the best design of each refinement that meets all items, the best first."""
-        found = sorted(self._best.values(), key=lambda each: -each.rows.objective)
-        return [each.design for each in found if each.design is not None]
+        """Return the best design of each refinement, the best first.
+
+        Those that meet all items by their objective, then the others by their violation.
+        """
+        met = sorted(self._best.values(), key=lambda each: -each.rows.objective)
+        near = [each for number, each in self._nearest.items() if number not in self._best]
+        near.sort(key=lambda each: each.rows.violation)
+        return [each.design for each in [*met, *near] if each.design is not None]
 
     def summary(self) -> dict[str, Any] | None:
         """Return the numbers of designs, geometries and sheets, and the best objective.

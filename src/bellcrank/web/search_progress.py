@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 import time
 from typing import TYPE_CHECKING, Any, Self
@@ -102,10 +103,13 @@ class ProgressReporter:
     def refining(self, number: int, progress: RefinementProgress) -> None:
         """Record the progress of the refinement of a design."""
         with self._lock:
+            self._refinements.only_met = (
+                _met_score(max(self._scores.values(), default=-math.inf)) is not None
+            )
             self._refinements.add(number, progress)
 
     def refined_designs(self) -> list[Design]:
-        """Return the best design of each refinement that meets all items, the best first."""
+        """Return the best design of each refinement, those that meet all items first."""
         with self._lock:
             return self._refinements.designs()
 

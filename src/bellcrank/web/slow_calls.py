@@ -260,8 +260,8 @@ def tolerance(text: str, mask: str, part: dict[str, Any], share: str = "") -> di
     dict
         ``sentence`` on the scenarios; ``rows`` of texts, the first with the names of the columns;
         ``met``, the number of random ``prints`` that meet all items, or what ``met_words`` say;
-        ``losses``, the part of the efficiency that the loss of each strut costs: ``beams``, and
-        ``cost``, None where the full stroke is not reached.
+        ``losses``, the part of the ``measure``, efficiency or rotation, that the loss of each strut
+        costs: ``beams``, and ``cost``, None where the full stroke is not reached.
     """
     from bellcrank.part import PartSpec
     from bellcrank.workflows.tolerance import (
@@ -291,7 +291,11 @@ def tolerance(text: str, mask: str, part: dict[str, Any], share: str = "") -> di
         "met_words": met_words(report),
         "deviations": deviation_words(report.deviations),
         "rows": tolerance_rows(report),
-        "losses": {"beams": list(losses), "cost": [finite(each) for each in losses.values()]},
+        "losses": {
+            "measure": report.tolerance.measure,
+            "beams": list(losses),
+            "cost": [finite(each) for each in losses.values()],
+        },
     }
 
 

@@ -79,7 +79,7 @@ def _load_texts(loads: Loads, units: ProblemUnits) -> list[str]:
         whole = force.force.sum(axis=0)
         size = units.in_part("force", float(np.linalg.norm(whole)))
         where = f"{_direction(whole)} on {_nodes(force.nodes)}"
-        found.append(f"load of {size:.3g} N {where}, grows with the input")
+        found.append(f"load of {size:.3g} N in all {where}, grows with the input")
     for spring in loads.springs:
         size = units.in_part("stiffness", spring.stiffness * len(spring.nodes))
         towards = _direction(spring.direction)

@@ -237,7 +237,10 @@ def swept_size(bundle: Export, stroke: list[tuple[float, NDArray[np.float64]]]) 
     low, high = (ends - half).min(axis=(0, 1, 2)), (ends + half).max(axis=(0, 1, 2))
     if part.dimension == 2:
         bounds = np.reshape(bundle.outline().bounds, (2, 2))
-        low, high = np.minimum(low, bounds[0]), np.maximum(high, bounds[1])
+    else:
+        vertices = bundle.solid().vertices
+        bounds = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
+    low, high = np.minimum(low, bounds[0]), np.maximum(high, bounds[1])
     return [float(length) for length in high - low]
 
 

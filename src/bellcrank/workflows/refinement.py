@@ -144,7 +144,8 @@ def _refined(
 def with_refined(selection: Selection, designs: Sequence[Design]) -> Selection:
     """Return a selection with the first of some refined designs that meets all items.
 
-    With the selected design if none does, by eight elements in each strut.
+    If neither one of them nor the selected design does, by eight elements in each strut, with the
+    one that is nearest to that.
 
     Parameters
     ----------
@@ -153,12 +154,17 @@ def with_refined(selection: Selection, designs: Sequence[Design]) -> Selection:
     designs
         Designs of a refinement that was stopped, the best first.
     """
-    for design in designs:
-        chosen = _verified(_finalist(selection), design)
+    if not designs:
+        return selection
+    own = _finalist(selection)
+    refined = [_verified(own, design) for design in designs]
+    for chosen in refined:
         assert chosen.verification is not None
         if chosen.verification.fault is None:
             return _with_finalist(selection, chosen)
-    return selection
+    near = nearest([_verified(own, selection.design), *refined])
+    is_better = bool(near) and near[0].design is not selection.design
+    return _with_finalist(selection, near[0], near) if is_better else selection
 
 
 def _is_enough(results: Sequence[Refinement]) -> bool:

@@ -123,7 +123,7 @@ def as_item(quantity: Item | ObjectiveTerm) -> Item:
 
 
 def worst_struts(tolerance: Tolerance) -> list[tuple[int, float]]:
-    """Return the struts with the part of the efficiency that their loss costs, worst first."""
+    """Return the struts with the part of the motion that their loss costs, worst first."""
     return sorted(tolerance.strut_losses().items(), key=lambda pair: -pair[1])
 
 
@@ -321,7 +321,27 @@ def tolerance_sentence(report: ToleranceReport) -> str:
             f"nodes up to {report.spec.scale * sizes.node:.2g} mm off, inputs turned by up to "
             f"{sizes.angle:g} degrees"
         )
+        if causes := _causes(report):
+            sentence += f"; {causes}"
     return sentence
+
+
+def _causes(report: ToleranceReport) -> str:
+    """Return what random prints miss, and what a turned input alone misses; empty if nothing."""
+    tolerance, problem = report.tolerance, report.design.problem
+    prints = tolerance.of_kind("print")
+    lost = sum(not tolerance.results[number].is_stable for number in prints)
+    missed = [f"{LOST}: {lost}"] if lost else []
+    rows = [(row.quantity, row) for row in tolerance.rows() if isinstance(row.quantity, Item)]
+    for item, row in rows:
+        if count := round((1.0 - row.share) * len(prints)) - lost:
+            missed.append(f"{item_label(item, problem)}: {count}")
+    found = [f"prints that miss items: {', '.join(missed)}"] if missed else []
+    turned = [item for item, row in rows if "input" in row.worst and not row.worst["input"].met]
+    if turned:
+        names = ", ".join(item_label(item, problem) for item in turned)
+        found.append(f"with an input turned as far, a part as drawn misses {names}, too")
+    return "; ".join(found)
 
 
 def deviation_words(deviations: Deviations) -> str:
@@ -367,5 +387,6 @@ def strut_lines(report: ToleranceReport, count: int) -> list[str]:
     others = [(beam, loss) for beam, loss in losses if np.isfinite(loss)][:count]
     if others:
         cost = ", ".join(f"{beam} ({100.0 * loss:.0f} %)" for beam, loss in others)
-        lines.append(f"parts of the efficiency that the loss of other struts costs: {cost}")
+        measure = report.tolerance.measure
+        lines.append(f"parts of the {measure} that the loss of other struts costs: {cost}")
     return lines

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -178,6 +179,8 @@ class FrameEvaluator:
     def load_bearing(self, mask: ArrayLike) -> NDArray[np.bool_]:
         """Return the beams of a design that can carry load: no loose pieces, no dead ends.
 
+        A dead end carries nothing but its own weight, which does not count.
+
         Returns
         -------
         (M,) bool
@@ -186,7 +189,8 @@ class FrameEvaluator:
 
         present = self._present(mask)
         self._last = None
-        find_structure(self.frame, present, self.structure, self.memory)
+        frame = replace(self.frame, has_weight=False) if self.frame.has_weight else self.frame
+        find_structure(frame, present, self.structure, self.memory)
         moves = self.structure.active[self.frame.beams].astype(bool).any(axis=1)
         carrying = (self.structure.present != 0) & moves
         if self.divisions == 1:
