@@ -59,9 +59,8 @@ def _by_method(task: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 
 def claims(figures: Mapping[str, Any]) -> list[Claim]:
     """Compare the methods; the paper has no such values."""
-    return [_claim(name, task, figures) for name, task in figures["tasks"].items()] + [
-        _lift_claim(figures["lift"])
-    ]
+    found = [_claim(name, task, figures) for name, task in figures["tasks"].items()]
+    return found if figures["lift"] is None else [*found, _lift_claim(figures["lift"])]
 
 
 def _claim(name: str, task: Mapping[str, Any], figures: Mapping[str, Any]) -> Claim:

@@ -35,7 +35,7 @@ class Settings:
     triangle, finer
         Triangle sizes of the analysis and of its convergence check, mm.
     lift
-        Title, columns and rows of the straight, loaded motion.
+        Title, columns and rows of the straight, loaded motion; None for a comparison without it.
     lift_seeds
         Number of bellcrank's designs of it; the best is reported.
     """
@@ -57,5 +57,5 @@ class Settings:
     iterations: int = 100
     triangle: float = 1.0
     finer: float = 0.7
-    lift: tuple[str, int, int] = ("straight lift", 10, 11)
+    lift: tuple[str, int, int] | None = ("straight lift", 10, 11)
     lift_seeds: int = 3

@@ -46,6 +46,7 @@ def straight_lift(
     The input moves right, the output up. The items are those of straight entries of the library:
     gain, off-axis motion, rotation, sag, payload and strain. Contact is not scored.
     """
+    assert settings.lift is not None
     title, columns, rows = settings.lift
     box = box_of("lift", columns, rows, settings.stroke, None, settings.width)
     ours, shape = _ours(box, settings, store)
