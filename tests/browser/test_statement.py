@@ -213,3 +213,32 @@ def test_a_load_without_a_unit_is_in_newtons(page: Any) -> None:
     fill(page, "payload", "0.05")
     wanted = [{"at_least": "0.05 N"}]
     until(page, lambda: task(page)["table"]["cases"][0]["outputs"][0].get("payload") == wanted)
+
+
+def test_a_task_is_scaled_with_all_its_lengths(page: Any) -> None:
+    page.get_by_label("or start from").select_option("twist-column")
+    until(page, lambda: summary(page, "supports") == "7 nodes")
+    section(page, "domain")
+    page.get_by_label("Scale the task to").fill("77")
+    page.get_by_role("button", name="Scale", exact=True).click()
+    until(page, lambda: task(page)["table"]["part"]["spacing"] == 7.7)
+    table = task(page)["table"]
+    assert table["part"]["width"] == pytest.approx(0.77 * 2.0)
+    assert table["domain"]["size"] == pytest.approx([0.77 * 33, 0.77 * 33, 0.77 * 52], abs=0.01)
+    assert field(page, "Scale the task to") == "100"
+    # The same nodes are selected, and the task can be searched at once.
+    until(page, lambda: page.get_by_role("button", name="Design it").is_enabled())
+    assert (summary(page, "supports"), summary(page, "outputs")) == ("7 nodes", "6 nodes")
+    page.keyboard.press("Control+z")
+    until(page, lambda: "spacing" not in task(page)["table"].get("part", {}))
+
+
+def test_an_output_that_moves_again_has_its_items_back(page: Any) -> None:
+    tool(page, "Outputs")
+    before = task(page)["table"]["cases"][0]["outputs"][0]
+    assert "off_axis" in before
+    motion = page.get_by_label("Motion of the output")
+    motion.get_by_text("turns").click()
+    until(page, lambda: "off_axis" not in task(page)["table"]["cases"][0]["outputs"][0])
+    motion.get_by_text("moves").click()
+    until(page, lambda: task(page)["table"]["cases"][0]["outputs"][0] == before)

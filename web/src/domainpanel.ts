@@ -2,10 +2,10 @@
 
 import { get } from "./api";
 import { bundledTask, emptySpaceTask, emptyTask, exampleTask } from "./begin";
-import { button, choice, clear, count, field, h, select } from "./dom";
+import { button, choice, clear, count, field, h, number, select } from "./dom";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
-import { cleaned, isSpatial, resized, type Amount, type Domain, type Material, type OutputTable, type Shape, type Table, type Task, type ZoneKind, type ZoneShape } from "./task";
+import { cleaned, isSpatial, resized, scaled, type Amount, type Domain, type Material, type OutputTable, type Shape, type Table, type Task, type ZoneKind, type ZoneShape } from "./task";
 import { lengthIn } from "./text";
 
 /** Problems of the paper on whose lattices a part can be designed. */
@@ -160,6 +160,7 @@ export class DomainPanel {
         amount("domain-width", "Width (x)", domain.size![0], "mm", side(0)), amount("domain-depth", "Depth (y)", domain.size![1], "mm", side(1)), amount("domain-height", "Height (z)", domain.size![2], "mm", side(2))),
         this.cells(domain, put)),
       this.filled(),
+      this.scaling(),
       kind === "outline" && h("div", {},
         corners ? amount("domain-corners", "Corners, mm", corners.length > 40 ? undefined : corners.map((point) => point.join(", ")).join("; "), "", (value) => {
           const points = String(value ?? "").split(";").map((text) => text.split(",").map(Number) as [number, number]).filter((point) => point.length === 2 && point.every(Number.isFinite));
@@ -169,6 +170,20 @@ export class DomainPanel {
           put({ ...domain, outline: picked === "circle" ? { circle: [40, 40], radius: 40 } : [[0, 0], [80, 0], [80, 40], [40, 40], [40, 70], [0, 70]] })),
         button("Read DXF or SVG", () => drawing.click(), "", { "data-key": "outline" }), drawing),
       kind === "problem" && field("Lattice", lattice, "", "With the supports, input and output of the paper unless you select others."));
+  }
+
+  /** A field and a button that multiply all lengths of the task. */
+  private scaling(): HTMLElement {
+    const { editor } = this;
+    const percent = number(100, { min: 1, max: 10000, step: "any" }, () => undefined);
+    percent.dataset.key = "domain-scale";
+    const scale = (): void => {
+      const value = percent.valueAsNumber;
+      if (value >= 1 && value <= 10000 && value !== 100) editor.change(scaled(editor.task.table, value / 100));
+    };
+    return h("div", {},
+      h("div", { class: "row between" }, field("Scale the task to", percent, "%"), button("Scale", scale, "", { "data-key": "scale" })),
+      h("p", { class: "note" }, "Multiplies all lengths: domain, spacing, struts, places of nodes, strokes and travels. Loads and forces stay."));
   }
 
   /** Centre and radius of a round outline. */

@@ -1,6 +1,7 @@
 // The task as a table, as in a task file, with undo, and its conversion to a link.
 
 import type { Part, Point, Problem } from "./api";
+import { lengthIn } from "./text";
 
 /** A number in the usual unit, or a text with a unit. */
 export type Amount = number | string;
@@ -191,6 +192,44 @@ export function resized(table: Table, size: number[]): Table {
   const { holes, keep_out, solid } = table.domain;
   const domain = cleaned({ ...table.domain, size, holes: holes?.map(shape), keep_out: keep_out?.map(shape), solid: solid?.map(shape) });
   return cleaned({ ...table, domain, supports: moved(table.supports), cases });
+}
+
+/** A table with all lengths multiplied by a factor: the same nodes are selected. Forces, stiffnesses and ratios stay. */
+export function scaled(table: Table, factor: number): Table {
+  const long = <T extends Amount | boolean | undefined>(value: T): T => {
+    const length = typeof value === "number" || typeof value === "string" ? lengthIn(value) : NaN;
+    return (Number.isNaN(length) ? value : Math.round(1000 * factor * length) / 1000) as T;
+  };
+  const point = (given: Point | undefined): Point | undefined => given?.map(long) as Point | undefined;
+  const shape = <T extends Shape>(given: T): T => cleaned({
+    ...given, circle: point(given.circle), sphere: point(given.sphere), cylinder: point(given.cylinder), radius: long(given.radius),
+    box: given.box?.map(long), polygon: given.polygon?.map((each) => point(each)!),
+  });
+  const region = (given: Region): Region => cleaned({ ...shape(given), point: point(given.point), between: point(given.between), without: given.without && shape(given.without) });
+  const at = <T extends { at?: Region[] }>(sections: T[] | undefined): T[] | undefined => sections?.map((each) => cleaned({ ...each, at: each.at?.map(region) }));
+  const travel = (given: Bounds): Bounds => cleaned({
+    ...given, value: long(given.value), at_least: long(given.at_least), at_most: long(given.at_most), target: long(given.target), tolerance: long(given.tolerance), scale: long(given.scale),
+  });
+  const output = (given: OutputTable): OutputTable => cleaned({
+    ...given, travel: given.travel?.map(travel),
+    path: given.path && cleaned({ ...given.path, points: given.path.points?.map((each) => point(each)!), arc: given.path.arc && ([long(given.path.arc[0]), given.path.arc[1]] as [Amount, Amount]) }),
+  });
+  const { part = {}, domain, limits } = table;
+  const { size, outline, holes, keep_out, solid } = domain;
+  return cleaned({
+    ...table,
+    part: cleaned({ ...part, spacing: long(part.spacing ?? 10), width: long(part.width ?? 2), thickness: isSpatial(table) ? part.thickness : long(part.thickness ?? 5), fillet: long(part.fillet), joint: long(part.joint) }),
+    domain: cleaned({
+      ...domain, size: size?.map(long), outline: Array.isArray(outline) ? outline.map((each) => point(each)!) : outline && shape(outline),
+      holes: holes?.map(shape), keep_out: keep_out?.map(shape), solid: solid?.map(shape),
+    }),
+    supports: at(table.supports),
+    cases: table.cases.map((each) => cleaned({
+      ...each, supports: at(each.supports), loads: at(each.loads), outputs: at(each.outputs)?.map(output),
+      inputs: at(each.inputs)?.map((given) => cleaned({ ...given, displacement: long(given.displacement) })),
+    })),
+    limits: limits && cleaned({ ...limits, clearance: long(limits.clearance) }),
+  });
 }
 
 const DIRECTIONS: Record<string, Point> = { right: [1, 0], up: [0, 1], left: [-1, 0], down: [0, -1] };
