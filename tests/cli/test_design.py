@@ -242,9 +242,9 @@ def test_a_part_is_reported_with_the_model_of_every_figure(part: Path) -> None:
     difference = f"({data['verification']['difference']:+.1%})"
     rows = [
         ("", "frames, as searched", "frames, 8 elements"),
-        ("off-axis motion", f"{one['off_axis']:.1%}", f"{eight['off_axis']:.1%}"),
+        ("off-axis motion at full stroke", f"{one['off_axis']:.1%}", f"{eight['off_axis']:.1%}"),
         (
-            "rotation of the output",
+            "rotation at full stroke",
             *(f"{each['output_rotation_deg']:.1f} deg" for each in (one, eight)),
         ),
     ]

@@ -83,7 +83,7 @@ def test_every_item_is_reported_with_what_is_wanted_reached_and_met(met: tuple[P
     ]  # fmt: skip
     assert all(row[-1].strip() == "yes" for row in rows[start + 1 : start + 7])
     payload = [text.strip() for text in rows[start + 4] if text][2:]
-    assert payload == ["> 0.981 N", "> 0.981 N", "-", "yes"]
+    assert payload == [*["> 0.981 N (100 g)"] * 2, "-", "yes"]
     data = json.loads((folder / "summary.json").read_text())
     assert data["specification"]["met"] is True
     assert data["specification"]["binding"] is None
@@ -105,7 +105,7 @@ def test_figures_of_the_part_stand_beside_the_items(met: tuple[Path, str]) -> No
     assert len(row["path_mm"]) == 17
     assert row["path_mm"][0] == [0.0, 0.0]
     assert "payload that halves the travel" in out
-    assert "limit points of the force" in out
+    assert "extremes of the input force" in out
     summary = (folder / "summary.md").read_text()
     assert "| item | wanted |" in summary
 
