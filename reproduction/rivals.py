@@ -338,7 +338,7 @@ STUDY = register(
     )
 )  # fmt: skip
 
-WIDE_STRUTS = register(
+register(
     replace(
         STUDY,
         name="rivals-wide",

@@ -225,12 +225,36 @@ def test_a_task_is_scaled_with_all_its_lengths(page: Any) -> None:
     table = task(page)["table"]
     assert table["part"]["width"] == pytest.approx(0.77 * 2.0)
     assert table["domain"]["size"] == pytest.approx([0.77 * 33, 0.77 * 33, 0.77 * 52], abs=0.01)
-    assert field(page, "Scale the task to") == "100"
+    until(page, lambda: field(page, "Scale the task to") == "100")
     # The same nodes are selected, and the task can be searched at once.
     until(page, lambda: page.get_by_role("button", name="Design it").is_enabled())
-    assert (summary(page, "supports"), summary(page, "outputs")) == ("7 nodes", "6 nodes")
+    nodes = ("7 nodes", "6 nodes")
+    until(page, lambda: (summary(page, "supports"), summary(page, "outputs")) == nodes)
     page.keyboard.press("Control+z")
     until(page, lambda: "spacing" not in task(page)["table"].get("part", {}))
+
+
+def test_paths_strokes_and_zones_are_scaled_with_a_task(page: Any) -> None:
+    def scale(name: str) -> Any:
+        page.get_by_label("or start from").select_option(name)
+        until(page, lambda: task(page)["table"]["name"] == name)
+        section(page, "domain")
+        page.get_by_label("Scale the task to").fill("50")
+        page.get_by_role("button", name="Scale", exact=True).click()
+        until(page, lambda: task(page)["table"].get("part", {}).get("spacing") == 5)
+        until(page, lambda: page.get_by_role("button", name="Design it").is_enabled())
+        return task(page)["table"]
+
+    (case,) = scale("arc")["cases"]
+    assert case["inputs"][0]["displacement"] == 2.5
+    assert case["inputs"][0]["at"][0]["point"] == [43, 44]
+    assert case["outputs"][0]["path"]["arc"] == [10, 60]
+    assert case["outputs"][0]["payload"] == [{"value": "10 g"}]
+    bracket = scale("bracket")
+    assert bracket["domain"]["outline"][2] == [65, 25]
+    assert bracket["domain"]["holes"] == [{"circle": [15.5, 13], "radius": 4.5}]
+    assert bracket["supports"][0]["at"][1] == {"circle": [37.5, 2.5], "radius": 5.5}
+    assert bracket["cases"][0]["inputs"][0]["at"][0]["between"] == [10, 25]
 
 
 def test_an_output_that_moves_again_has_its_items_back(page: Any) -> None:

@@ -38,6 +38,13 @@ def test_a_missing_problem_file_is_named(command: str) -> None:
     assert line.endswith("; and there is no such file")
 
 
+def test_a_task_that_has_not_been_designed_is_named(here: Path) -> None:
+    (here / "lift.toml").write_text(LIFT)
+    line = refusal("export", "lift", "lift.stl")
+    assert line == "error: no design 'lift'; bellcrank design lift.toml makes it"
+    assert "unknown problem 'crane-2'" in refusal("export", "crane-2", "lift.stl")
+
+
 @pytest.mark.parametrize("name", ["a[b]", "a[/b]", "[bold]"])
 def test_what_was_typed_comes_back_as_it_was(name: str) -> None:
     line = refusal("design", PROBLEM, "--search", name)

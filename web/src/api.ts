@@ -49,6 +49,9 @@ export function isTurning({ specification }: Problem, loadCase: string): boolean
   return turns && !own.some(({ quantity }) => quantity === "gain" || quantity === "travel");
 }
 
+/** Whether a rotation is maximised: the motion of the output along a direction then says little. */
+export function maximisesRotation({ specification }: Problem): boolean { return specification?.maximise[0]?.quantity === "rotation"; }
+
 /** The mechanical model of a problem in words. */
 export function modelOf(problem: Problem): string { return problem.section ? "frames" : "spring model"; }
 

@@ -1,6 +1,6 @@
 // Animation of a design along its computed path, with amplification and colours.
 
-import { isInSpace, isTurning, post, type Motion, type Point, type Problem, type ToleranceFound } from "./api";
+import { isInSpace, isTurning, maximisesRotation, post, type Motion, type Point, type Problem, type ToleranceFound } from "./api";
 import { bitsOf } from "./api";
 import { binned, BINS, Drawing, markRegions, sectionOf, where, type Group, type LatticeDrawing } from "./drawing";
 import { loadSpace } from "./loadspace";
@@ -114,8 +114,7 @@ export class Player {
 
   private colours(): HTMLElement {
     // The sensitivity is that of output / input motion.
-    const maximised = this.problem.specification?.maximise?.[0]?.quantity;
-    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ...(maximised === "rotation" ? [] : [["sensitivity", "Sensitivity"]]), ...(isInSpace(this.problem) ? [] : [["stress", "Stress"]]), ...(this.losses ? [["loss", "Loss of struts"]] : [])] as [Colour, string][],
+    return choice("Colour", [["plain", "Plain"], ["energy", "Strain energy"], ...(maximisesRotation(this.problem) ? [] : [["sensitivity", "Sensitivity"]]), ...(isInSpace(this.problem) ? [] : [["stress", "Stress"]]), ...(this.losses ? [["loss", "Loss of struts"]] : [])] as [Colour, string][],
       this.colour, (picked) => this.paint(picked));
   }
 

@@ -1,6 +1,6 @@
 // The panel beside a design: its specification, figures, part, files and next steps.
 
-import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, post, session, type Collection, type Comparison, type ItemState, type Part, type PartFigures, type PartReport, type Point, type Problem, type Registries, ServerError, type ToleranceFound } from "./api";
+import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, maximisesRotation, post, session, type Collection, type Comparison, type ItemState, type Part, type PartFigures, type PartReport, type Point, type Problem, type Registries, ServerError, type ToleranceFound } from "./api";
 import { compareAddress } from "./address";
 import { openTask } from "./begin";
 import { button, clear, count, download, duration, field, figure, h, number, select } from "./dom";
@@ -239,11 +239,10 @@ export class Result {
     const solid = typeof found === "object" ? found : null;
     const first = report.figures[0];
     const objective = otherObjective(report.objectives);
-    const isRotation = objective?.quantity === "rotation";
     clear(this.headline, h("strong", {}, objective?.reached ?? figure(first?.efficiency, 2)),
       h("span", {}, h("b", { class: "model" }, FRAMES), h("br"),
         `${objective ? sentence(objective.label).slice(0, -1) : "Output / input motion"} of the part with ${this.strutText()} struts`,
-        solid?.efficiency != null && h("span", {}, h("br"), isRotation ? `${figure(solid.output_rotation_deg, 1)}° in ${words}` : `${figure(solid.efficiency, 2)} as output / input motion in ${words}`)));
+        solid?.efficiency != null && h("span", {}, h("br"), this.turns ? `${figure(solid.output_rotation_deg, 1)}° in ${words}` : `${figure(solid.efficiency, 2)} as output / input motion in ${words}`)));
     const columns: Column[] = [];
     // The model of the search is that of the frames, with fewer elements.
     if (report.items.frames) columns.push({ title: "frames", items: report.items.frames });
@@ -302,8 +301,11 @@ export class Result {
   /** Whether nodes and widths are those of a refinement; also of one that was stopped. */
   private get isRefined(): boolean { return "refinement" in this.subject.provenance || Boolean(this.subject.problem.widths); }
 
+  /** The task of the design, if it is known. */
+  private get task(): Table | null { return (this.subject.task ?? this.subject.provenance["task"] ?? null) as Table | null; }
+
   /** Whether the rotation of the output is what counts. */
-  private get turns(): boolean { return this.subject.problem.specification?.maximise?.[0]?.quantity === "rotation"; }
+  private get turns(): boolean { return maximisesRotation(this.subject.problem); }
 
   private showTable(): void {
     this.showReport();
@@ -461,8 +463,7 @@ export class Result {
 
   /** That the part is larger than the domain of its task; empty if it is not. */
   private excessText(size: [number, number, number]): string {
-    const task = (this.subject.task ?? this.subject.provenance["task"]) as Table | null | undefined;
-    const domain = task?.domain?.size;
+    const domain = this.task?.domain?.size;
     if (!domain || !domain.some((length, axis) => typeof length === "number" && size[axis]! > length + 0.05)) return "";
     return `Larger than the domain of ${domain.join(" × ")} mm.`;
   }
@@ -619,8 +620,7 @@ export class Result {
     const { problem, mask } = this.subject;
     const open = async (byHand: boolean): Promise<void> => {
       try {
-        const stored = this.subject.task ?? this.subject.provenance["task"] as Table | undefined;
-        const table = (stored ?? await post<Table>("/tasks/from-problem", { problem, part: this.part })) as Table;
+        const table = this.task ?? await post<Table>("/tasks/from-problem", { problem, part: this.part });
         openTask({ table, hand: byHand ? mask : null });
         if (byHand) sessionStorage.setItem("bellcrank-tool", "hand");
         location.hash = "#/draw";
@@ -643,15 +643,15 @@ export class Result {
       button("Change by hand", () => void open(true))),
       h("p", { class: "note content" }, problem.specification ? "Refine moves the nodes of this design and changes its widths until it meets all items with a larger objective. " : "",
         "Search on begins a new search with this design. Both keep this one.",
-        this.isRefined ? " Change by hand shows these struts on the nodes of the task, with its widths: as they were before the refinement." : ""),
+        this.isRefined && this.task ? " Change by hand shows these struts on the nodes of the task, with its widths: as they were before the refinement." : ""),
       place && h("div", { class: "content" }, field("Compare with", others)));
   }
 
   /** Begin a search at this design, or its refinement. */
   private async begin({ refine = false, tolerant = false }: { refine?: boolean; tolerant?: boolean }): Promise<void> {
-    const { problem, mask, title, provenance } = this.subject;
+    const { problem, mask, title } = this.subject;
     // The struts of a refined design belong to its own nodes, not to those of its task.
-    const task = refine || this.isRefined ? null : this.subject.task ?? provenance["task"] ?? null;
+    const task = refine || this.isRefined ? null : this.task;
     try {
       const { id } = await post<{ id: string }>("/runs", {
         title: `${title.replace(/, (refined|searched on)$/, "")}, ${refine ? "refined" : "searched on"}`.slice(-120), session: session(), start: mask, refine, tolerant,

@@ -170,28 +170,38 @@ export function withImages(built: Built, symmetry: string, nodes: number[]): num
 /** Distance from the middle, over the size of a domain, up to which something belongs to the middle. */
 const MIDDLE = 0.15;
 
+/** A table whose regions and zones lie elsewhere: coordinates along each axis, and radii, are mapped. */
+function relocated(table: Table, along: (value: number, axis: number) => number, radius: (value: Amount | undefined) => Amount | undefined): Table {
+  const point = (given: Point | undefined): Point | undefined => given?.map((value, axis) => along(value!, axis)) as Point | undefined;
+  const shape = <T extends Shape>(given: T): T => cleaned({
+    ...given, circle: point(given.circle), sphere: point(given.sphere), cylinder: point(given.cylinder), radius: radius(given.radius),
+    box: given.box?.map((value, k) => along(value, k % (given.box!.length / 2))), polygon: given.polygon?.map((each) => point(each)!),
+  });
+  const region = (given: Region): Region => cleaned({
+    ...shape(given), point: point(given.point), without: given.without && shape(given.without),
+    between: given.between?.map((value) => along(value!, given.edge === "left" || given.edge === "right" ? 1 : 0)) as Point | undefined,
+  });
+  const moved = <T extends { at?: Region[] }>(sections: T[] | undefined): T[] | undefined => sections?.map((each) => (each.at ? { ...each, at: each.at.map(region) } : each));
+  const cases = table.cases.map((each) => cleaned({ ...each, supports: moved(each.supports), inputs: moved(each.inputs), outputs: moved(each.outputs), loads: moved(each.loads) }));
+  const { outline, holes, keep_out, solid } = table.domain;
+  const domain = cleaned({
+    ...table.domain, outline: Array.isArray(outline) ? outline.map((each) => point(each)!) : outline && shape(outline),
+    holes: holes?.map(shape), keep_out: keep_out?.map(shape), solid: solid?.map(shape),
+  });
+  return cleaned({ ...table, domain, supports: moved(table.supports), cases });
+}
+
 /** A table for a domain of another size: selected nodes and zones keep their distances from the nearer side or from the middle. */
 export function resized(table: Table, size: number[]): Table {
   const old = table.domain.size!;
   const along = (value: number, axis: number): number => {
+    if (typeof value !== "number") return value;
     const part = value / old[axis]! - 0.5;
     const share = Math.abs(part) < MIDDLE ? 0.5 : part > 0 ? 1 : 0;
     return Math.round(100 * (value + share * (size[axis]! - old[axis]!))) / 100;
   };
-  const point = (given: Point | undefined): Point | undefined => given?.map((value, axis) => along(value!, axis)) as Point | undefined;
-  const shape = <T extends Shape>(given: T): T => cleaned({
-    ...given, circle: point(given.circle), sphere: point(given.sphere), cylinder: point(given.cylinder),
-    box: given.box?.map((value, k) => along(value, k % size.length)), polygon: given.polygon?.map((each) => point(each)!),
-  });
-  const region = (given: Region): Region => cleaned({
-    ...shape(given), point: point(given.point), without: given.without && shape(given.without),
-    between: given.between?.map((value) => (typeof value === "number" ? along(value, given.edge === "left" || given.edge === "right" ? 1 : 0) : value)) as Point | undefined,
-  });
-  const moved = <T extends { at?: Region[] }>(sections: T[] | undefined): T[] | undefined => sections?.map((each) => (each.at ? { ...each, at: each.at.map(region) } : each));
-  const cases = table.cases.map((each) => cleaned({ ...each, supports: moved(each.supports), inputs: moved(each.inputs), outputs: moved(each.outputs), loads: moved(each.loads) }));
-  const { holes, keep_out, solid } = table.domain;
-  const domain = cleaned({ ...table.domain, size, holes: holes?.map(shape), keep_out: keep_out?.map(shape), solid: solid?.map(shape) });
-  return cleaned({ ...table, domain, supports: moved(table.supports), cases });
+  const moved = relocated(table, along, (value) => value);
+  return { ...moved, domain: { ...moved.domain, size } };
 }
 
 /** A table with all lengths multiplied by a factor: the same nodes are selected. Forces, stiffnesses and ratios stay. */
@@ -200,33 +210,20 @@ export function scaled(table: Table, factor: number): Table {
     const length = typeof value === "number" || typeof value === "string" ? lengthIn(value) : NaN;
     return (Number.isNaN(length) ? value : Math.round(1000 * factor * length) / 1000) as T;
   };
-  const point = (given: Point | undefined): Point | undefined => given?.map(long) as Point | undefined;
-  const shape = <T extends Shape>(given: T): T => cleaned({
-    ...given, circle: point(given.circle), sphere: point(given.sphere), cylinder: point(given.cylinder), radius: long(given.radius),
-    box: given.box?.map(long), polygon: given.polygon?.map((each) => point(each)!),
-  });
-  const region = (given: Region): Region => cleaned({ ...shape(given), point: point(given.point), between: point(given.between), without: given.without && shape(given.without) });
-  const at = <T extends { at?: Region[] }>(sections: T[] | undefined): T[] | undefined => sections?.map((each) => cleaned({ ...each, at: each.at?.map(region) }));
   const travel = (given: Bounds): Bounds => cleaned({
     ...given, value: long(given.value), at_least: long(given.at_least), at_most: long(given.at_most), target: long(given.target), tolerance: long(given.tolerance), scale: long(given.scale),
   });
-  const output = (given: OutputTable): OutputTable => cleaned({
-    ...given, travel: given.travel?.map(travel),
-    path: given.path && cleaned({ ...given.path, points: given.path.points?.map((each) => point(each)!), arc: given.path.arc && ([long(given.path.arc[0]), given.path.arc[1]] as [Amount, Amount]) }),
-  });
-  const { part = {}, domain, limits } = table;
-  const { size, outline, holes, keep_out, solid } = domain;
+  const path = (given: PathTable): PathTable => cleaned({ ...given, points: given.points?.map((each) => each.map(long) as Point), arc: given.arc && ([long(given.arc[0]), given.arc[1]] as [Amount, Amount]) });
+  const moved = relocated(table, long, long);
+  const { part = {}, domain, limits, cases } = moved;
   return cleaned({
-    ...table,
+    ...moved,
     part: cleaned({ ...part, spacing: long(part.spacing ?? 10), width: long(part.width ?? 2), thickness: isSpatial(table) ? part.thickness : long(part.thickness ?? 5), fillet: long(part.fillet), joint: long(part.joint) }),
-    domain: cleaned({
-      ...domain, size: size?.map(long), outline: Array.isArray(outline) ? outline.map((each) => point(each)!) : outline && shape(outline),
-      holes: holes?.map(shape), keep_out: keep_out?.map(shape), solid: solid?.map(shape),
-    }),
-    supports: at(table.supports),
-    cases: table.cases.map((each) => cleaned({
-      ...each, supports: at(each.supports), loads: at(each.loads), outputs: at(each.outputs)?.map(output),
-      inputs: at(each.inputs)?.map((given) => cleaned({ ...given, displacement: long(given.displacement) })),
+    domain: cleaned({ ...domain, size: domain.size?.map(long) }),
+    cases: cases.map((each) => cleaned({
+      ...each,
+      inputs: each.inputs?.map((given) => cleaned({ ...given, displacement: long(given.displacement) })),
+      outputs: each.outputs?.map((given): OutputTable => cleaned({ ...given, travel: given.travel?.map(travel), path: given.path && path(given.path) })),
     })),
     limits: limits && cleaned({ ...limits, clearance: long(limits.clearance) }),
   });

@@ -86,7 +86,7 @@ def print_json(text: str) -> None:
 def text_grid(rows: list[list[str]]) -> Table:
     """Return rows of texts as a table; efficiencies and items that are missed are bold."""
     grid = Table.grid(padding=(0, 2))
-    for _ in rows[0]:
+    for _ in next(iter(rows), ()):
         grid.add_column(overflow="fold")
     for name, *values in rows:
         bold = name.startswith("efficiency (") or "NO" in values

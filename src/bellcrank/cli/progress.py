@@ -61,9 +61,8 @@ class SearchProgress(Live):
     def verifying(self, done: int, total: int) -> None:
         """Show the number of candidates that have been verified, and the largest number."""
         self._bar.update(self._task, description="verifying")
-        figures = f"verified candidates: {done} of at most {total}"
-        if not done:
-            figures = f"at most {total} candidates"
+        count = f"at most {total} candidates"
+        figures = f"verified {done} of {count}" if done else count
         self._show(done, total, figures, figures)
 
     def refining(self, number: int, step: RefinementStep) -> None:

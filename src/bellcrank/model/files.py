@@ -60,9 +60,6 @@ def find_problem(name_or_path: str | os.PathLike[str]) -> Problem:
         return builtin[name]()
     if Path(name).is_file():
         return read_problem(name)
-    task = Path(f"{name}.toml")
-    if task.is_file():
-        raise UnknownName(f"no design {name!r}; bellcrank design {task} makes it")
     raise UnknownName(
         f"unknown problem {name!r}; known: {', '.join(builtin)}; and there is no such file"
     )

@@ -40,7 +40,7 @@ def find_design(name_or_path: str) -> Design:
     Raises
     ------
     UnknownName
-        If there is no such design, file or problem.
+        If there is no such design, file or problem; says if there is a task file of that name.
     InvalidSettings
         If the folder is that of an unfinished run.
     InvalidFile, InvalidProblem
@@ -72,6 +72,9 @@ def find_design(name_or_path: str) -> Design:
     found = None if task is None else task.initial_design()
     if found is None and not path.exists():
         found = _design_of_machines(name_or_path)
+    task_file = Path(f"{name_or_path}.toml")
+    if found is None and not path.exists() and task_file.is_file():
+        raise UnknownName(f"no design {name_or_path!r}; bellcrank design {task_file} makes it")
     return find_problem(name_or_path).full_design() if found is None else found
 
 

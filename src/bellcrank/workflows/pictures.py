@@ -129,7 +129,7 @@ def draw_report(report: DesignReport, folder: RunFolder) -> None:
             path_options(folder, report.settings),
             human_efficiency=human.efficiency if human else None,
             final_efficiency=selection.efficiency_after,
-            is_refined=report.refinement is not None,
+            is_refined=report.refinement is not None and report.refinement.improved,
             best=(found.chain, int(np.searchsorted(steps, found.step))),
         ),
         overwrite=True,

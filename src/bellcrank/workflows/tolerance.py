@@ -321,7 +321,7 @@ def tolerance_sentence(report: ToleranceReport) -> str:
             f"nodes up to {report.spec.scale * sizes.node:.2g} mm off, inputs turned by up to "
             f"{sizes.angle:g} degrees"
         )
-        if causes := _causes(report):
+        if not sizes.keep and (causes := _causes(report)):
             sentence += f"; {causes}"
     return sentence
 
