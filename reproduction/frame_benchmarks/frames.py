@@ -212,7 +212,7 @@ class BenchmarkFrame:
             partly=np.asarray(some & ~fully).astype(np.uint8),
             protected=np.ones(count, np.uint8),
             block=elimination_order(frame.beams, fully, springs=False),
-            load=self._field(self.load, unit, size, moments=True),
+            load=self._field(self.load, unit, size, moments=True)[None],
             drive=self._field(self.drive, unit, size, moments=False),
         )
 

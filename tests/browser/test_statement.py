@@ -215,6 +215,26 @@ def test_a_load_without_a_unit_is_in_newtons(page: Any) -> None:
     until(page, lambda: task(page)["table"]["cases"][0]["outputs"][0].get("payload") == wanted)
 
 
+def test_a_weight_acts_before_the_input(page: Any) -> None:
+    def case() -> dict[str, Any]:
+        return task(page)["table"]["cases"][0]
+
+    tool(page, "Loads")
+    click(page, *node(page, 20, 70))
+    until(page, lambda: len(case().get("loads", [])) == 1)
+    page.get_by_label("before the input").check()
+    until(page, lambda: case()["loads"][0].get("during") == ["0%", "20%"])
+    assert case()["inputs"][0]["during"] == ["20%", "100%"]
+    until(page, lambda: page.get_by_role("button", name="Design it").is_enabled())
+    page.get_by_label("grows with the input").check()
+    until(page, lambda: "during" not in case()["loads"][0])
+    assert "during" not in case()["inputs"][0]
+    page.get_by_label("before the input").check()
+    until(page, lambda: "during" in case()["inputs"][0])
+    page.get_by_role("button", name="Remove load 1").click()
+    until(page, lambda: not case()["loads"] and "during" not in case()["inputs"][0])
+
+
 def test_a_task_is_scaled_with_all_its_lengths(page: Any) -> None:
     page.get_by_label("or start from").select_option("twist-column")
     until(page, lambda: summary(page, "supports") == "7 nodes")

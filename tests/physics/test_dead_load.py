@@ -88,7 +88,7 @@ def test_the_state_under_a_dead_load_is_that_of_the_independent_path(name: str) 
     part = task.part.of(given.design)
     frame = part_frame(part)
     dead = resisting_force(with_output(given.design.problem, given.output), given.force)
-    weight = np.zeros_like(frame.load)
+    weight = np.zeros_like(frame.drive)
     weight[dead.nodes, :2] = part.stiffness_unit * part.scale * dead.force
     equations = DeadLoadEquations(frame, weight)
     path = follow_path(equations)

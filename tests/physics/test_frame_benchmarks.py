@@ -31,7 +31,7 @@ def bend(count: int) -> Array:
     places = np.stack([np.sin(angle), 1.0 - np.cos(angle), 0.0 * angle], axis=1)
     frame = frame_of(chain(100.0 / unit * places))
     load = np.zeros_like(frame.load)
-    load[-1, 2] = 600.0
+    load[0, -1, 2] = 600.0
     inertia = 1e7 / 12.0 / unit**2
     section = stiffness(frame.rest, 1e7, 5e6 / 6.0 / unit**2, (inertia, inertia), shear=5e6)
     found = equilibrium(replace(frame, section=section, load=load))
@@ -58,7 +58,7 @@ def test_an_end_moment_rolls_a_cantilever_into_a_circle(dimension: int, turns: f
     if dimension == 2:
         section = np.ascontiguousarray(section[:, [0, 2, 3, 4]])
     load = np.zeros_like(frame.load)
-    load[-1, -1] = 2.0 * np.pi * turns * rigidity / count
+    load[0, -1, -1] = 2.0 * np.pi * turns * rigidity / count
     found = equilibrium(replace(frame, section=section, load=load))
     assert found.status == "converged"
     # Beams of equal curvature are the chords of a circle.
@@ -162,7 +162,7 @@ def lateral(count: int, factor: float) -> Equilibrium:
     weak = 1e-3 * count**2
     twisting = 0.7 * weak
     load = np.zeros_like(frame.load)
-    load[-1, 1] = factor * np.sqrt(weak * twisting) / count**2
+    load[0, -1, 1] = factor * np.sqrt(weak * twisting) / count**2
     section = stiffness(frame.rest, 10.0, twisting, (1e4 * weak, weak))
     return equilibrium(replace(frame, section=section, load=load))
 
@@ -188,7 +188,7 @@ def column(count: int, dimension: int, factor: float) -> Equilibrium:
     if dimension == 2:
         section = np.ascontiguousarray(section[:, [0, 2, 3, 4]])
     load = np.zeros_like(frame.load)
-    load[-1, 0] = -factor * np.pi**2 * rigidity / (2.0 * count) ** 2
+    load[0, -1, 0] = -factor * np.pi**2 * rigidity / (2.0 * count) ** 2
     return equilibrium(replace(frame, section=section, load=load))
 
 
@@ -229,7 +229,7 @@ def right_angle(count: int, force: float, stiff: float = STIFF) -> Equilibrium:
     second = np.stack([count + 0.0 * along, -along, 0.0 * along], axis=1)
     frame = frame_of(chain(np.concatenate([first, second[1:]])))
     load = np.zeros_like(frame.load)
-    load[-1, 0] = force
+    load[0, -1, 0] = force
     axial, twisting = 71240.0 * 18.0, TWISTING / unit**2
     section = stiffness(frame.rest, axial, twisting, (stiff / unit**2, WEAK / unit**2))
     return equilibrium(replace(frame, section=section, load=load))

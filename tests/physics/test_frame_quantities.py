@@ -200,7 +200,7 @@ def test_the_output_stiffness_is_that_of_an_added_force(name: str) -> None:
     for sign in (1.0, -1.0):
         load = np.zeros_like(frame_of(problem).load)
         share = sign * force * output.direction / len(output.nodes)
-        load[output.nodes, : problem.lattice.dimension] = share
+        load[0, output.nodes, : problem.lattice.dimension] = share
         pushed = equilibrium(frame_of(problem, load=load), mask)
         moved = pushed.u[output.nodes, : problem.lattice.dimension]
         travel.append((moved * output.direction).sum(axis=1).mean())

@@ -31,6 +31,7 @@ SLIDER: dict[str, Any] = {
 }
 INPUT = "cases.0.inputs.0"
 OUTPUT = "cases.0.outputs.0"
+AT_OUTPUT = {"at": {"point": [11, 53]}, "direction": "down"}
 
 
 def changed(changes: dict[str, Any]) -> dict[str, Any]:
@@ -94,10 +95,13 @@ WRONG: list[tuple[str, dict[str, Any], str]] = [
     ("one end of a range", {f"{INPUT}.during": ["50%"]}, "during: expected two fractions of the"),
     ("words for a range", {f"{INPUT}.during": ["begin", "end"]}, "inputs[0].during[0]: expected"),
     ("a range that ends early", {f"{INPUT}.during": ["0%", "50%"]},
-     "cases[0].inputs.during: no input moves from 50% to 100% of the stroke"),
-    ("a force in a part of the stroke", {f"{INPUT}.displacement": None, f"{INPUT}.force": "1 N",
-                                         f"{INPUT}.during": ["0%", "100%"]},
-     "cases[0].inputs[0].during: expected an input with a displacement, got one with a force"),
+     "cases[0].inputs.during: no input moves and no force grows from 50% to 100%"),
+    ("a short range of a load",
+     {"cases.0.loads": [{**AT_OUTPUT, "force": "10 g", "during": [0, 0.005]}]},
+     "cases[0].loads[0].during: expected an end that is at least 0.01 of the stroke after"),
+    ("a spring in a part of the stroke",
+     {"cases.0.loads": [{**AT_OUTPUT, "spring": 0.1, "during": ["0%", "50%"]}]},
+     "cases[0].loads[0].during: expected a force, got a spring"),
     ("no output", {"cases.0.outputs": []}, "cases[0].outputs: expected at least one"),
     ("a gain as a number", {f"{OUTPUT}.gain": 3}, "gain: expected 'maximise', or a table like"),
     ("a target alone", {f"{OUTPUT}.gain": {"target": 3}}, "key 'tolerance' is missing"),

@@ -8,6 +8,7 @@ import {
   cleaned, directionAt, imagesOf, isSpatial, isTurn, nodesOf, QUANTITIES, regionsOf, sectionsOf, vectorInSpace, vectorOf, withSection, withSections,
   type Amount, type Bounds, type CaseTable, type InputTable, type LoadTable, type OutputTable, type QuantityName, type Target,
 } from "./task";
+import { isWeight, whenActs, withInputsAfterWeights } from "./weights";
 
 type Bound = "at_least" | "at_most" | "value" | "target";
 
@@ -20,7 +21,7 @@ const USUAL: Record<QuantityName, Usual> = {
   off_axis: { title: "off-axis motion", bound: "at_most", example: "10%", about: "Largest motion normal to the direction, over the travel." },
   rotation: { title: "rotation", unit: "°", bound: "value", example: "5 deg", about: "Rotation of the output, counter-clockwise positive." },
   payload: { title: "payload", unit: "N", bound: "at_least", example: "10 g", about: "Load against the direction of the output that grows with the input, as that of a workpiece, and halves the travel. To reach all items under a load, add a force in the step Loads.", isExplained: true },
-  dead_load: { title: "dead load", unit: "N", bound: "at_least", example: "10 g", about: "Weight against the direction of the output that acts before the input, and halves the travel.", isExplained: true },
+  dead_load: { title: "dead load", unit: "N", bound: "at_least", example: "10 g", about: "Weight against the direction of the output that acts before the input, and halves the travel. To reach all items under a weight in any direction, add it in the step Loads.", isExplained: true },
   stiffness: { title: "stiffness", unit: "N/mm", bound: "at_least", example: "0.1 N/mm", about: "Stiffness of the output along its direction at the full stroke." },
   blocked_force: { title: "blocked force", unit: "N", bound: "at_least", example: "0.1 N", about: "Force of the output at full stroke on a stop where it rests. To hold an object: ask for the travel up to it, and for this force.", isExplained: true },
   sag: { title: "sag under own weight", bound: "at_most", example: "10%", about: "Motion of the output by the own weight, over its travel." },
@@ -66,7 +67,8 @@ export function casePanel(editor: TaskEditor, kind: "inputs" | "outputs" | "load
     const isActive = editor.target.kind === kind && editor.target.index === index;
     const nodes = editor.built ? nodesOf(editor.built, editor.loadCase, kind)[index]?.length ?? 0 : 0;
     const drop = (): void => {
-      editor.change(withSections(editor.task.table, editor.loadCase, kind, sections.filter((_, k) => k !== index) as never));
+      const table = withSections(editor.task.table, editor.loadCase, kind, sections.filter((_, k) => k !== index) as never);
+      editor.change(withInputsAfterWeights(table, editor.loadCase));
       editor.aimAt({ kind, index: 0 });
     };
     return h("fieldset", { class: `entry${isActive ? " active" : ""}`, "data-entry": `${kind}-${index}` },
@@ -167,36 +169,48 @@ function directionInSpace(editor: TaskEditor, target: Target, given: InputTable[
   }) : null);
 }
 
+/** The part of the stroke in which an input or a load grows. */
+function rangeFields(editor: TaskEditor, target: Target, during: [Amount, Amount] | undefined): HTMLElement {
+  const key = `${target.kind}-${target.index}`;
+  const put = (end: 0 | 1) => (value: Amount | undefined): void => {
+    const next: [Amount, Amount] = [during?.[0] ?? 0, during?.[1] ?? 1];
+    next[end] = value ?? end;
+    set(editor, target, { during: next });
+  };
+  return h("details", { ...(during ? { open: true } : {}) }, h("summary", { "data-key": `${key}-when` }, "In a part of the stroke"),
+    h("div", { class: "row" }, amount(`${key}-from`, "From", during?.[0], "", put(0), "0 to 1, or a percentage"), amount(`${key}-to`, "To", during?.[1], "", put(1))));
+}
+
 function inputFields(editor: TaskEditor, each: InputTable, target: Target): HTMLElement[] {
   const key = `inputs-${target.index}`;
   const isForce = each.force !== undefined;
-  const during = each.during ?? [];
-  const range = (index: 0 | 1) => (value: Amount | undefined): void => {
-    const next = [during[0] ?? 0, during[1] ?? 1] as [Amount, Amount];
-    next[index] = value ?? index;
-    set(editor, target, { during: next });
-  };
   return [
     directionFields(editor, target, each.direction),
     h("div", { class: "row" },
       isForce ? amount(`${key}-amount`, "Force", each.force, "N", (value) => set(editor, target, { force: value ?? 1 }))
         : amount(`${key}-amount`, "Stroke", each.displacement, "mm", (value) => set(editor, target, { displacement: value ?? 3 })),
       choice("Prescribed", [["displacement", "motion"], ["force", "force"]] as ["displacement" | "force", string][], isForce ? "force" : "displacement", (picked) =>
-        set(editor, target, picked === "force" ? { force: 1, displacement: undefined, during: undefined } : { displacement: 3, force: undefined }), `prescribed-${target.index}`)),
-    ...(isForce ? [] : [h("details", { ...(each.during ? { open: true } : {}) }, h("summary", { "data-key": `${key}-when` }, "In a part of the stroke"),
-      h("div", { class: "row" }, amount(`${key}-from`, "From", during[0], "", range(0), "0 to 1, or a percentage"), amount(`${key}-to`, "To", during[1], "", range(1))))]),
+        set(editor, target, picked === "force" ? { force: 1, displacement: undefined } : { displacement: 3, force: undefined }), `prescribed-${target.index}`)),
+    rangeFields(editor, target, each.during),
   ];
 }
 
 function loadFields(editor: TaskEditor, each: LoadTable, target: Target): HTMLElement[] {
   const isSpring = each.spring !== undefined;
+  const put = (changes: Partial<LoadTable>): void =>
+    editor.change(withInputsAfterWeights(withSection(editor.task.table, editor.loadCase, target, changes), editor.loadCase));
   return [
     directionFields(editor, target, each.direction),
     h("div", { class: "row" },
       isSpring ? amount(`loads-${target.index}-amount`, "Stiffness", each.spring, "N/mm", (value) => set(editor, target, { spring: value ?? 0.1 }))
         : amount(`loads-${target.index}-amount`, "Force or mass", each.force, "", (value) => set(editor, target, { force: value ?? "10 g" }), "with its unit: 0.5 N, 50 g"),
       choice("Kind of load", [["force", "force"], ["spring", "spring"]] as ["force" | "spring", string][], isSpring ? "spring" : "force", (picked) =>
-        set(editor, target, picked === "spring" ? { spring: 0.1, force: undefined } : { force: "10 g", spring: undefined }), `load-${target.index}`)),
+        put(picked === "spring" ? { spring: 0.1, force: undefined, during: undefined } : { force: "10 g", spring: undefined }), `load-${target.index}`)),
+    ...(isSpring ? [] : [
+      choice("When it acts", [["with", "grows with the input"], ["before", "before the input"]] as ["with" | "before", string][], isWeight(each) ? "before" : "with", (picked) =>
+        put(whenActs(picked === "before")), `when-${target.index}`),
+      isWeight(each) ? h("p", { class: "note" }, "A weight that hangs on the part before it is pushed: it acts in the first fifth of the stroke, the input moves in the rest. Motions count from the part as drawn.")
+        : rangeFields(editor, target, each.during)]),
   ];
 }
 

@@ -12,6 +12,7 @@ import {
   assign, History, imagesOf, isSpatial, isTask, isTurn, nodesOf, sectionsOf, toLink, vectorInSpace, vectorOf, isSymmetric, withImages, withSection, withSections,
   type Built, type Direction, type Domain, type Hold, type Kind, type Shape, type Table, type Target, type Task, type Tool, type ZoneKind, type ZoneShape,
 } from "./task";
+import { withInputsAfterWeights } from "./weights";
 import { faultText, fileName, lengthIn, sentence, suffixOf, undoKeys } from "./text";
 import type { Arrow, TaskDrawing, View } from "./view";
 
@@ -220,7 +221,7 @@ export class Editor implements TaskEditor {
     let now = built;
     if (index >= sections.length) {
       const fresh = kind === "supports" ? { at: [], ...(this.hold === "all" ? {} : { hold: this.hold }) } : FIRST[kind];
-      table = withSections(table, loadCase, kind, [...sections, fresh] as never);
+      table = withInputsAfterWeights(withSections(table, loadCase, kind, [...sections, fresh] as never), loadCase);
       now = withRegion(built, loadCase, { kind, index: sections.length }, []);
       this.target = { kind, index: sections.length };
     }

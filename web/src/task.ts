@@ -12,7 +12,7 @@ export interface Region extends Shape { point?: Point; count?: number; edge?: st
 export type Hold = "all" | "x" | "y" | "z";
 export interface Support { at: Region[]; hold?: Hold }
 export interface InputTable { at?: Region[]; direction?: Direction; displacement?: Amount; force?: Amount; during?: [Amount, Amount] }
-export interface LoadTable { at: Region[]; direction: Direction; force?: Amount; spring?: Amount }
+export interface LoadTable { at: Region[]; direction: Direction; force?: Amount; spring?: Amount; during?: [Amount, Amount] }
 export interface Bounds {
   value?: Amount; at_least?: Amount; at_most?: Amount; target?: Amount; tolerance?: Amount;
   from?: Amount; to?: Amount; of?: string; maximise?: boolean; minimise?: boolean; scale?: Amount;

@@ -19,7 +19,7 @@ from bellcrank.fem.continuum.system import continuum_system
 from bellcrank.fem.path import PathState, PathStatus, StepControl, follow_path
 from bellcrank.mechanics import Channel, StrokeRecord, channels_of, item_results
 from bellcrank.mechanics.frames.output_loads import (
-    resisting_force,
+    with_dead_load,
     with_held_output,
     with_output,
     with_payload,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from bellcrank.fem.path import EquilibriumPath
     from bellcrank.fem.results import Field
     from bellcrank.mechanics import ItemResult
-    from bellcrank.model import Item, NodeForce, ObjectiveTerm, Problem, Specification
+    from bellcrank.model import Item, ObjectiveTerm, Problem, Specification
     from bellcrank.part import Part
 
     Values = NDArray[np.float64]
@@ -198,7 +198,7 @@ class _Sheet:
         if main is None:
             return None
         ends = [end for item in self.items for end in (item.start, item.stop) if end > 0.0]
-        kinks = self.case.input.kinks
+        kinks = self.case.kinks
         fractions = np.unique(np.concatenate([np.arange(1, STATES + 1) / STATES, ends, kinks]))
         channels, done = {}, 1
         for channel in needed:
@@ -212,11 +212,9 @@ class _Sheet:
     def _part(self, problem: Problem) -> Part:
         return replace(self.part, design=replace(self.part.design, problem=problem))
 
-    def _follow(
-        self, problem: Problem, dead_load: NodeForce | None = None
-    ) -> tuple[ContinuumEquations, EquilibriumPath] | None:
+    def _follow(self, problem: Problem) -> tuple[ContinuumEquations, EquilibriumPath] | None:
         """Follow a load case to the full stroke; None if stability is lost before."""
-        system = continuum_system(self._part(problem), self.mesh, LAW, dead_load=dead_load)
+        system = continuum_system(self._part(problem), self.mesh, LAW)
         equations = ContinuumEquations(system)
         path = follow_path(equations, self.control, lambda state: self.report(state.load))
         return (equations, path) if path.status is PathStatus.CONVERGED else None
@@ -235,9 +233,9 @@ class _Sheet:
         ]
         return SheetPath(part, equations, path, states, [each.field for each in stresses])
 
-    def _last_motion(self, problem: Problem, dead_load: NodeForce | None = None) -> Values | None:
+    def _last_motion(self, problem: Problem) -> Values | None:
         """Return (N, d) the displacements at full stroke, lattice units; None without stability."""
-        found = self._follow(problem, dead_load)
+        found = self._follow(problem)
         if found is None:
             return None
         equations, path = found
@@ -253,7 +251,7 @@ class _Sheet:
         if channel.name in single:
             return single[channel.name](main, problem)
         values = self._along(channel, main, problem)
-        return stroke_spline(main.loads, values, self.case.input.kinks, fractions)
+        return stroke_spline(main.loads, values, self.case.kinks, fractions)
 
     def _along(self, channel: Channel, main: SheetPath, problem: Problem) -> Values:
         """Return (S,) or (S, c) a channel at the states of a path."""
@@ -319,8 +317,7 @@ class _Sheet:
     def _carried(self, _main: SheetPath, problem: Problem) -> Values:
         """Return (1, 1 + d) the motion of the output under a force that acts before the input."""
         force = self.forces[Channel("carried_motion", next(iter(problem.outputs)))]
-        motion = self._last_motion(problem, resisting_force(problem, force))
-        return self._means_of(motion, problem)
+        return self._means_of(self._last_motion(with_dead_load(problem, force)), problem)
 
     def _means_of(self, motion: Values | None, problem: Problem) -> Values:
         if motion is None:

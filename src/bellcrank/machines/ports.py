@@ -65,17 +65,17 @@ def ports_of(design: Design) -> tuple[Port, Port]:
 
 
 def check_one_motion(problem: Problem) -> None:
-    """Check that the nodes of the input move together.
+    """Check that inputs and loads grow together.
 
     Raises
     ------
     InvalidSettings
-        If they move in parts of the stroke (`Input.during`).
+        If they grow in parts of the stroke (`Problem.has_ranges`).
     """
-    if problem.input.during is not None:
+    if problem.has_ranges:
         raise InvalidSettings(
-            f"problem {problem.name!r}: expected an input whose nodes move together, got "
-            "input.during; a port has one coordinate"
+            f"problem {problem.name!r}: expected inputs and loads that grow together, got "
+            "'during'; a port has one coordinate"
         )
 
 

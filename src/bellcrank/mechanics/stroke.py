@@ -29,8 +29,8 @@ def at_fraction(problem: Problem, fraction: float) -> Problem:
     Raises
     ------
     InvalidSettings
-        If an input moves in a part of the stroke (`Input.during`): inputs then have different
-        fractions of their displacements. Equilibria of the whole stroke show those at a fraction
+        If an input or a load grows in a part of the stroke (`Problem.has_ranges`): they then have
+        different fractions of their sizes. Equilibria of the whole stroke show those at a fraction
         (`FrameEvaluator.equilibrium`).
 
     Examples
@@ -39,10 +39,11 @@ def at_fraction(problem: Problem, fraction: float) -> Problem:
     >>> round(at_fraction(find_problem("crane"), 0.5).input.amount, 3)
     0.217
     """
-    if problem.input.during is not None and fraction != 1.0:
+    if problem.has_ranges and fraction != 1.0:
         raise InvalidSettings(
-            f"problem {problem.name!r}: expected inputs that move along the whole stroke, got "
-            "input.during; a fraction of such a stroke is not a problem with a smaller input"
+            f"problem {problem.name!r}: expected inputs and loads that grow along the whole "
+            "stroke, got 'during'; a fraction of such a stroke is not a problem with a smaller "
+            "input"
         )
     given, loads = problem.input, problem.loads
     forces = tuple(replace(each, force=fraction * each.force) for each in loads.forces)

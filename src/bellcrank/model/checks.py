@@ -10,6 +10,7 @@ from bellcrank.errors import InvalidProblem
 from bellcrank.model.arrays import check_ids, locked, real_array
 from bellcrank.model.conditions import ROLLERS, Aggregate
 from bellcrank.model.section import Elasticity, Section
+from bellcrank.model.stroke_ranges import check_cover
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -54,16 +55,19 @@ def check_section(lattice: Lattice, section: object, material: object) -> None:
 def check_frame_only(
     section: Section | None, inputs: Input, loads: Loads, specification: object
 ) -> None:
-    """Check that there is a section where only frames can be computed.
+    """Check what only frames have: loads, a specification, parts of the stroke (`Input.during`).
 
-    Because of loads, a specification, or an input that moves in a part of the stroke.
+    They need a section, and an input or a load that grows at every fraction of the stroke.
     """
-    if section is None and inputs.during is not None:
+    if section is not None:
+        ranges = [inputs.ranges, *(np.array([each.range]) for each in loads.forces)]
+        check_cover("input.during", np.concatenate(ranges))
+    elif inputs.during is not None:
         raise InvalidProblem(
             "input.during: expected a problem with a section; in the spring model all inputs move "
             "along the whole stroke"
         )
-    if section is None and (loads or specification is not None):
+    elif loads or specification is not None:
         raise InvalidProblem(
             "loads and specification: expected a problem with a section; the spring model has "
             "neither"

@@ -10,7 +10,7 @@ import numpy as np
 
 from bellcrank.errors import InvalidProblem
 from bellcrank.model.arrays import id_list, locked, positive_number, real_array, rebuild
-from bellcrank.model.stroke_ranges import WHOLE, kinks_of, stroke_ranges
+from bellcrank.model.stroke_ranges import WHOLE, stroke_ranges
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -132,15 +132,15 @@ class Input:
     amount
         Displacement (lattice units) or force on each node, greater than zero.
     during : (n, 2) float64, optional
-        Fractions of the stroke between which each node moves from rest to its full displacement;
-        before it rests, and after it is held. A single pair is used for all nodes. None if all
-        nodes move during the whole stroke.
+        Fractions of the stroke between which the displacement of each node, or the force on it,
+        grows from zero to its full size; after, it is constant. A single pair is used for all
+        nodes. None if all grow during the whole stroke.
 
     Raises
     ------
     InvalidProblem
-        If there is no node, a direction is not a unit vector, the drive or the amount is
-        invalid, or `during` is given with a force or does not cover the stroke.
+        If there is no node, a direction is not a unit vector, or the drive, the amount or a range
+        is invalid.
 
     Examples
     --------
@@ -167,25 +167,15 @@ class Input:
         object.__setattr__(self, "direction", locked(direction))
         object.__setattr__(self, "amount", positive_number("input.amount", self.amount))
         if self.during is not None:
-            if self.drive == "force":
-                raise InvalidProblem(
-                    "input.during: expected an input driven by a displacement, got a force; "
-                    "forces grow along the whole stroke"
-                )
             during = stroke_ranges("input.during", self.during, len(nodes))
             object.__setattr__(self, "during", during)
 
     @property
     def ranges(self) -> NDArray[np.float64]:
-        """(n, 2) fractions of the stroke between which each node moves."""
+        """(n, 2) fractions of the stroke between which each displacement or force grows."""
         if self.during is None:
             return np.tile(WHOLE, (len(self.nodes), 1))
         return self.during
-
-    @property
-    def kinks(self) -> tuple[float, ...]:
-        """Fractions within the stroke at which a node starts or stops, ascending."""
-        return () if self.during is None else kinks_of(self.during)
 
     __reduce__ = rebuild
 

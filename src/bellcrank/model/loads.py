@@ -10,6 +10,7 @@ import numpy as np
 from bellcrank.errors import InvalidProblem
 from bellcrank.model.arrays import locked, positive_number, real_array, rebuild
 from bellcrank.model.conditions import node_region, unit_vectors
+from bellcrank.model.stroke_ranges import WHOLE, stroke_range
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,18 +18,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NodeForce:
-    """Forces on nodes with fixed directions; they grow in proportion to the input.
+    """Forces on nodes with fixed directions.
 
     Parameters
     ----------
     nodes : (n,) int64, node ids
     force : (n, d) float64
-        Force on each node at the full input; a single vector is used for all nodes.
+        Full force on each node; a single vector is used for all nodes.
+    during
+        Fractions of the stroke between which the forces grow from zero to their full size; after,
+        they are constant. None if they grow during the whole stroke.
 
     Raises
     ------
     InvalidProblem
-        If there is no node, or the forces have another shape or are not finite.
+        If there is no node, the forces have another shape or are not finite, or the range is
+        invalid.
 
     Examples
     --------
@@ -39,6 +44,7 @@ class NodeForce:
 
     nodes: NDArray[np.int64]
     force: NDArray[np.float64]
+    during: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         nodes = node_region("force.nodes", self.nodes)
@@ -51,8 +57,21 @@ class NodeForce:
         spread = np.broadcast_to(force, (len(nodes), force.shape[-1]))
         object.__setattr__(self, "nodes", locked(nodes))
         object.__setattr__(self, "force", locked(spread.copy()))
+        if self.during is not None:
+            during = stroke_range("force.during", self.during)
+            object.__setattr__(self, "during", None if during == WHOLE else during)
 
     __reduce__ = rebuild
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Fractions of the stroke between which the forces grow."""
+        return self.during or WHOLE
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data, as in a problem file."""
+        data = {"nodes": self.nodes.tolist(), "force": self.force.tolist()}
+        return data if self.during is None else {**data, "during": list(self.during)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,9 +173,7 @@ class Loads:
         """
         data: dict[str, Any] = {}
         if self.forces:
-            data["forces"] = [
-                {"nodes": each.nodes.tolist(), "force": each.force.tolist()} for each in self.forces
-            ]
+            data["forces"] = [each.to_dict() for each in self.forces]
         if self.springs:
             data["springs"] = [
                 {

@@ -41,6 +41,7 @@ from bellcrank.model.plain_data import (
 )
 from bellcrank.model.section import DEFAULT_MATERIAL, Elasticity, Section
 from bellcrank.model.specification import Case, Specification
+from bellcrank.model.stroke_ranges import kinks_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -232,6 +233,18 @@ class Problem:
         """
         lattice = replace(self.lattice, positions=positions)
         return replace(self, lattice=lattice, widths=widths, joints=None)
+
+    @property
+    def has_ranges(self) -> bool:
+        """Whether an input or a load grows in a part of the stroke only."""
+        return self.input.during is not None or any(each.during for each in self.loads.forces)
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Fractions within the stroke at which an input or a load starts or stops growing."""
+        if not self.has_ranges:
+            return ()
+        return kinks_of(np.array([*self.input.ranges, *(each.range for each in self.loads.forces)]))
 
     @property
     def special_nodes(self) -> NDArray[np.int64]:

@@ -24,8 +24,8 @@ number. Both forms can be combined.
     direction = [0, -1]             # one unit vector, or one for each node; in space [0, 0, -1]
     drive = "displacement"          # or "force"
     amount = 0.1                    # lattice units, at most the size of the lattice
-    during = [[0, 0.5], [0.5, 1]]   # fractions of the stroke between which the nodes move, one
-                                    # pair or one for each node; optional, with a section
+    during = [[0, 0.5], [0.5, 1]]   # fractions of the stroke between which it grows, one pair or
+                                    # one for each node; optional, with a section
 
     [output]
     nodes = [{ row = -1, leftmost = 2 }]
@@ -196,7 +196,11 @@ def _output(lattice: Lattice, table: OutputTable, key: str) -> Output:
 
 def _loads(lattice: Lattice, table: LoadsTable, key: str) -> Loads:
     forces = [
-        NodeForce(_nodes(lattice, each.nodes, f"{key}.forces[{k}].nodes"), each.force)  # type: ignore[arg-type]
+        NodeForce(
+            _nodes(lattice, each.nodes, f"{key}.forces[{k}].nodes"),
+            each.force,  # type: ignore[arg-type]  # checked there
+            each.during,  # type: ignore[arg-type]
+        )
         for k, each in enumerate(table.forces)
     ]
     springs = [

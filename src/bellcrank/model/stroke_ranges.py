@@ -1,7 +1,8 @@
-"""Parts of the stroke in which inputs move.
+"""Parts of the stroke in which inputs move and forces grow.
 
-An input moves from rest to its full displacement between two fractions of the stroke, in
-proportion to the stroke between them. Before it rests, and after it is held.
+An input moves from rest to its full displacement, and a force grows from zero to its full size,
+between two fractions of the stroke, in proportion to the stroke between them. Before, the input
+rests and the force is zero; after, both are held.
 """
 
 from __future__ import annotations
@@ -17,19 +18,19 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 WHOLE = (0.0, 1.0)
-SHORTEST = 0.01
+SHORTEST = 0.005
 """Smallest length of a range, as a part of the stroke."""
 DIGITS = 6
 """Decimals to which the ends of ranges are rounded, so that nearly equal ones are equal."""
 
 
-def stroke_range(name: str, values: ArrayLike) -> tuple[float, float]:
+def stroke_range(name: str, values: ArrayLike, shortest: float = SHORTEST) -> tuple[float, float]:
     """Return the begin and the end of a range, fractions of the stroke.
 
     Raises
     ------
     InvalidProblem
-        If they are not from 0 to 1, or not in this order and `SHORTEST` apart.
+        If they are not from 0 to 1, or not in this order and `shortest` apart.
 
     Examples
     --------
@@ -47,9 +48,9 @@ def stroke_range(name: str, values: ArrayLike) -> tuple[float, float]:
         raise InvalidProblem(
             f"{name}: expected fractions of the stroke from 0 to 1 (0% to 100%), got {shown}"
         )
-    if end < begin + SHORTEST:
+    if end < begin + shortest:
         raise InvalidProblem(
-            f"{name}: expected an end that is at least {SHORTEST:g} of the stroke after the "
+            f"{name}: expected an end that is at least {shortest:g} of the stroke after the "
             f"begin, got {shown}"
         )
     return begin, end
@@ -70,7 +71,7 @@ def stroke_ranges(name: str, values: ArrayLike, count: int) -> NDArray[np.float6
     Raises
     ------
     InvalidProblem
-        If a range is not valid, or no node moves in a part of the stroke.
+        If a range is not valid.
     """
     given = real_array(name, values)
     if given.shape not in {(2,), (count, 2)}:
@@ -80,12 +81,11 @@ def stroke_ranges(name: str, values: ArrayLike, count: int) -> NDArray[np.float6
         )
     given = np.broadcast_to(given, (count, 2))
     ranges = np.array([stroke_range(name, each) for each in given])
-    check_cover(name, ranges)
     return None if (ranges == WHOLE).all() else locked(ranges)
 
 
 def check_cover(name: str, ranges: NDArray[np.float64]) -> None:
-    """Check that some input moves at every fraction of the stroke.
+    """Check that some input moves, or some force grows, at every fraction of the stroke.
 
     Parameters
     ----------
@@ -96,14 +96,15 @@ def check_cover(name: str, ranges: NDArray[np.float64]) -> None:
     for begin, end in (*sorted(map(tuple, ranges.tolist())), (1.0, 1.0)):
         if begin > reached:
             raise InvalidProblem(
-                f"{name}: no input moves from {100.0 * reached:g}% to {100.0 * begin:g}% of the "
-                "stroke; expected ranges that together cover the whole stroke"
+                f"{name}: no input moves and no force grows from {100.0 * reached:g}% to "
+                f"{100.0 * begin:g}% of the stroke; expected ranges that together cover the whole "
+                "stroke"
             )
         reached = max(reached, end)
 
 
 def share_at(ranges: NDArray[np.float64], fraction: float) -> NDArray[np.float64]:
-    """Return (n,) the part of its full displacement that each input has at a fraction.
+    """Return (n,) the part of its full size that each displacement or force has at a fraction.
 
     Examples
     --------
@@ -132,7 +133,7 @@ def rate_at(ranges: NDArray[np.float64], fraction: float, toward: float) -> NDAr
 
 
 def delayed(ranges: NDArray[np.float64], start: float) -> NDArray[np.float64]:
-    """Return ranges (n, 2) of an input that begins at a fraction of the load.
+    """Return ranges (n, 2) compressed to the part of the stroke after a fraction.
 
     Examples
     --------
@@ -144,7 +145,7 @@ def delayed(ranges: NDArray[np.float64], start: float) -> NDArray[np.float64]:
 
 
 def kinks_of(ranges: NDArray[np.float64]) -> tuple[float, ...]:
-    """Return the fractions within the stroke at which an input starts or stops, ascending.
+    """Return the fractions within the stroke at which a range begins or ends, ascending.
 
     Examples
     --------

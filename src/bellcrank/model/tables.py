@@ -50,6 +50,7 @@ class ForceTable(Table):
 
     nodes: list[Any]
     force: list[Any]
+    during: list[Any] | None = None
 
 
 class SpringTable(Table):

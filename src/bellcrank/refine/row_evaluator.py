@@ -212,7 +212,7 @@ class RowEvaluator:
         evaluator, case = here.evaluator, here.evaluator.cases[name]
         own = [item for item in self.items if item.case == name]
         items = [item for item in own if channels_of(item.quantity, item.output)]
-        kinks = case.evaluator.problem.input.kinks
+        kinks = case.evaluator.problem.kinks
         fractions = fractions_of(own, kinks, verified=True)
         if name not in here.channels:
             here.channels[name] = case.evaluator.values(case.channels, fractions.tolist())

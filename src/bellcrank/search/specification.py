@@ -126,7 +126,7 @@ class SpecificationEvaluator:
             channels = list(dict.fromkeys(c for pair in needed for c in channels_of(*pair)))
             used = [self.items[k] for k in chosen]
             cheap = [channel for channel in channels if channel.name in CHEAP]
-            fractions = fractions_of(used, case.input.kinks, verified=False)
+            fractions = fractions_of(used, case.kinks, verified=False)
             self.cases[name] = _Case(evaluator, chosen, channels, cheap, fractions)
         self.records: dict[str, StrokeRecord] = {}
         self.violations = np.ones(len(self.items))
@@ -203,11 +203,11 @@ class SpecificationEvaluator:
             fractions = case.fractions
             if verified:
                 items = [self.items[k] for k in case.items]
-                fractions = fractions_of(items, case.evaluator.problem.input.kinks, verified=True)
+                fractions = fractions_of(items, case.evaluator.problem.kinks, verified=True)
             channels = case.evaluator.values(case.cheap, fractions.tolist(), at_end)
             records[name] = StrokeRecord(
                 fractions, channels, structural, case.evaluator.forces,
-                case.evaluator.problem.input.kinks,
+                case.evaluator.problem.kinks,
             )  # fmt: skip
         yield records
         for name, case in self.cases.items():

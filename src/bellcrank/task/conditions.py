@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 SMALLEST_STROKE = 1e-3
 """Smallest displacement of an input, in spacings."""
+SHORTEST_RANGE = 0.01
+"""Smallest part of the stroke in which an input or a load may grow."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,15 +120,18 @@ class CaseReader:
             supports = self.base.supports
         else:
             raise InvalidProblem("supports: expected at least one support of the part")
+        push, loads = self._input(case, key), self._loads(case, key)
+        ranges = [push.ranges, *(np.array([each.range]) for each in loads.forces)]
+        check_cover(f"{key}.inputs.during", np.concatenate(ranges))
         outputs = self._outputs(case, key, reader)
         reader.read("input_force", case.input_force, f"{key}.input_force")
         reader.read("strain", case.strain, f"{key}.strain")
         return Case(
             name=name,
             supports=supports,
-            input=self._input(case, key),
+            input=push,
             outputs=outputs,
-            loads=self._loads(case, key),
+            loads=loads,
         )
 
     def _input(self, case: CaseSection, key: str) -> Input:
@@ -148,30 +153,17 @@ class CaseReader:
                 )
         during = np.concatenate(
             [
-                np.tile(self._range(section, each, f"{key}.inputs[{k}]"), (len(each.nodes), 1))
+                np.tile(_range(section.during, f"{key}.inputs[{k}].during"), (len(each.nodes), 1))
                 for k, (section, each) in enumerate(zip(case.inputs, parts, strict=True))
             ]
         )
-        check_cover(f"{key}.inputs.during", during)
         return Input(
             nodes=np.concatenate([each.nodes for each in parts]),
             direction=np.concatenate([each.direction for each in parts]),
             drive=first.drive,
             amount=first.amount,
-            during=during if first.drive == "displacement" else None,
+            during=during,
         )
-
-    @staticmethod
-    def _range(section: InputSection, given: Input, key: str) -> tuple[float, float]:
-        """Return the fractions of the stroke between which an input moves."""
-        if section.during is None:
-            return WHOLE
-        if given.drive == "force":
-            raise InvalidProblem(
-                f"{key}.during: expected an input with a displacement, got one with a force; "
-                "forces grow along the whole stroke"
-            )
-        return stroke_range(f"{key}.during", section.during)
 
     def _one_input(self, section: InputSection, key: str) -> Input:
         base = None if self.base is None else self.base.input
@@ -229,10 +221,13 @@ class CaseReader:
             if (section.force is None) == (section.spring is None):
                 raise InvalidProblem(f"{where}: expected force or spring, and not both")
             nodes = self._nodes(section.at, f"{where}.at")
+            if section.during is not None and section.force is None:
+                raise InvalidProblem(f"{where}.during: expected a force, got a spring")
             if section.force is not None:
                 total = self.units.in_problem("force", section.force)
                 direction = self.vector(section.direction, f"{where}.direction")
-                forces.append(NodeForce(nodes, total / len(nodes) * direction))
+                during = _range(section.during, f"{where}.during")
+                forces.append(NodeForce(nodes, total / len(nodes) * direction, during))
             else:
                 springs.append(self._spring(nodes, section, where))
         weight = None
@@ -300,3 +295,8 @@ class CaseReader:
             )
         weight: NDArray[np.float64] = self.units.weight * self.vector(direction, key)
         return weight
+
+
+def _range(during: tuple[float, float] | None, key: str) -> tuple[float, float]:
+    """Return the fractions of the stroke between which an input or a load grows."""
+    return WHOLE if during is None else stroke_range(key, during, SHORTEST_RANGE)

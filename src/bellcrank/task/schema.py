@@ -124,6 +124,10 @@ class SupportSection(Table):
     """Coordinates that are held; ``"x"``, ``"y"`` and ``"z"`` are rollers."""
 
 
+StrokeRange = Annotated[tuple[Ratio, Ratio], BeforeValidator(as_range)]
+"""Two fractions of the stroke."""
+
+
 class InputSection(Table):
     """``[[cases.inputs]]``: nodes that are pushed."""
 
@@ -133,8 +137,8 @@ class InputSection(Table):
     """Displacement of each node."""
     force: Force | None = None
     """Total force."""
-    during: Annotated[tuple[Ratio, Ratio] | None, BeforeValidator(as_range)] = None
-    """Fractions of the stroke between which it moves from rest to its full displacement."""
+    during: StrokeRange | None = None
+    """Fractions of the stroke between which it grows from zero to its full size."""
 
 
 class LoadSection(Table):
@@ -143,9 +147,11 @@ class LoadSection(Table):
     at: NodeRegions
     direction: Direction
     force: Annotated[float, reader("load")] | None = None
-    """Total force, or the mass whose weight acts; it grows with the input."""
+    """Total force, or the mass whose weight acts."""
     spring: Stiffness | None = None
     """Total stiffness."""
+    during: StrokeRange | None = None
+    """Fractions of the stroke between which the force grows; by default the whole stroke."""
 
 
 class Bounds(Table):

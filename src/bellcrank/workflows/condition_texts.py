@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bellcrank.model.stroke_ranges import WHOLE
 from bellcrank.task import units_of
 from bellcrank.task.values import DIRECTIONS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from bellcrank.model import Problem
@@ -50,7 +53,7 @@ def condition_texts(problem: Problem, part: PartSpec) -> list[str]:
         springs = [
             _output_text(key, each, units) for key, each in case.outputs.items() if each.spring
         ]
-        texts = [_input_text(case.input, units), *_load_texts(case.loads, units), *springs]
+        texts = [*_input_texts(case.input, units), *_load_texts(case.loads, units), *springs]
         found += [f"{start}{text}" for text in texts]
     wanted, material = problem.specification, part.registered_material
     items = () if wanted is None else wanted.items
@@ -59,12 +62,22 @@ def condition_texts(problem: Problem, part: PartSpec) -> list[str]:
     return found
 
 
-def _input_text(given: Input, units: ProblemUnits) -> str:
+def _input_texts(given: Input, units: ProblemUnits) -> list[str]:
+    """Return a text for each range of the stroke in which nodes of an input move."""
     if given.drive == "force":
-        size = units.in_part("force", given.amount)
-        return f"input of {size:.3g} N {_direction(given.direction)}"
-    size = units.in_part("length", given.amount)
-    return f"input {size:.3g} mm {_direction(given.direction)}"
+        size = f"of {units.in_part('force', given.amount):.3g} N"
+    else:
+        size = f"{units.in_part('length', given.amount):.3g} mm"
+    found = []
+    for span in np.unique(given.ranges, axis=0):
+        own = (given.ranges == span).all(axis=1)
+        text = f"input {size} {_direction(given.direction[own])}"
+        found.append(text if tuple(span) == WHOLE else f"{text}, {_range_text(span)}")
+    return found
+
+
+def _range_text(span: Sequence[float]) -> str:
+    return f"from {100.0 * span[0]:g}% to {100.0 * span[1]:g}% of the stroke"
 
 
 def _output_text(name: str, output: Output, units: ProblemUnits) -> str:
@@ -79,7 +92,8 @@ def _load_texts(loads: Loads, units: ProblemUnits) -> list[str]:
         whole = force.force.sum(axis=0)
         size = units.in_part("force", float(np.linalg.norm(whole)))
         where = f"{_direction(whole)} on {_nodes(force.nodes)}"
-        found.append(f"load of {size:.3g} N in all {where}, grows with the input")
+        when = "with the input" if force.during is None else _range_text(force.during)
+        found.append(f"load of {size:.3g} N in all {where}, grows {when}")
     for spring in loads.springs:
         size = units.in_part("stiffness", spring.stiffness * len(spring.nodes))
         towards = _direction(spring.direction)

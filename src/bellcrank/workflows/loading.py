@@ -100,7 +100,7 @@ def loading_path(
     energy = np.zeros((states, problem.lattice.beam_count))
     efficiency, force = np.zeros(states), np.zeros(states)
     snapped = np.zeros(states, dtype=bool)
-    respond = _response_on_path if problem.input.during is not None else _response_from_rest
+    respond = _response_on_path if problem.has_ranges else _response_from_rest
     shares = np.maximum(fractions, SMALL).tolist()
     for k, (fraction, (response, strain)) in enumerate(
         zip(fractions.tolist(), respond(design, shares, objective, elements), strict=True)

@@ -21,8 +21,7 @@ from bellcrank.fem.continuum.backend import ngsolve, threads
 from bellcrank.fem.continuum.stability import count_negative, extreme_compliances
 from bellcrank.fem.continuum.system import MEAN_ORDER, integration
 from bellcrank.fem.path import Linearisation
-from bellcrank.mechanics.frames.system import DEAD
-from bellcrank.model.stroke_ranges import WHOLE, kinks_of, rate_at, share_at
+from bellcrank.model.stroke_ranges import kinks_of, rate_at, share_at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -110,20 +109,13 @@ class ContinuumEquations:
     @cached_property
     def kinks(self) -> tuple[float, ...]:
         """Fractions of the stroke at which a force or prescribed displacement starts or stops."""
-        return kinks_of(np.concatenate([self._ranges, self._periods]))
+        return kinks_of(np.concatenate([self._ranges, self.system.boundary.force_range]))
 
     @cached_property
     def _ranges(self) -> NDArray[np.float64]:
         """(g, 2) fractions of the stroke between which the prescribed displacements grow."""
         means = self.system.boundary.means
         return np.array([constraint.during for constraint in means]).reshape(-1, 2)
-
-    @cached_property
-    def _periods(self) -> NDArray[np.float64]:
-        """(1, 2) or (2, 2) the same of the forces, and of those that act before the input."""
-        if self.system.boundary.dead_force is None:
-            return np.array([WHOLE])
-        return np.array([[DEAD, 1.0], [0.0, DEAD]])
 
     @cached_property
     def _motions(self) -> NDArray[np.float64]:
@@ -133,14 +125,11 @@ class ContinuumEquations:
 
     @cached_property
     def _forces(self) -> NDArray[np.float64]:
-        """(1, F) or (2, F) change of the residual by the full forces, as `_periods`."""
+        """(G, F) change of the residual by the full forces of each range."""
         boundary = self.system.boundary
-        form = self._hub_load(boundary.loaded, boundary.force)
+        forms = [self._hub_load(boundary.loaded, force) for force in boundary.force]
         if boundary.weight is not None:
-            form += self._body_force(self.space.TestFunction()[0], boundary.weight)
-        forms = [form]
-        if boundary.dead_force is not None:
-            forms.append(self._hub_load(boundary.loaded, boundary.dead_force))
+            forms[0] += self._body_force(self.space.TestFunction()[0], boundary.weight)
         rows = []
         for each in forms:
             each.Assemble()
@@ -149,7 +138,8 @@ class ContinuumEquations:
 
     def _load_at(self, load: float) -> NDArray[np.float64]:
         """Return (F,) the part of the residual that depends on the load."""
-        total: NDArray[np.float64] = share_at(self._periods, load) @ self._forces
+        shares = share_at(self.system.boundary.force_range, load)
+        total: NDArray[np.float64] = shares @ self._forces
         total[len(total) - len(self._motions) :] += self._motions * share_at(self._ranges, load)
         return total
 
@@ -210,7 +200,8 @@ class ContinuumEquations:
 
         It is constant between kinks.
         """
-        rate: NDArray[np.float64] = rate_at(self._periods, load, toward) @ self._forces
+        rates = rate_at(self.system.boundary.force_range, load, toward)
+        rate: NDArray[np.float64] = rates @ self._forces
         given = self._motions * rate_at(self._ranges, load, toward)
         rate[len(rate) - len(given) :] += given
         return rate[self.free]

@@ -16,6 +16,7 @@ from bellcrank.fem.continuum.space_mesh import space_mesh
 from bellcrank.fem.continuum.system import MEAN_ORDER, continuum_system, integration
 from bellcrank.fem.path import EquilibriumPath, PathState, PathStatus, StepControl, follow_path
 from bellcrank.mechanics.output import best_fit_rotation
+from bellcrank.model.stroke_ranges import share_at
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -242,7 +243,10 @@ def _hub_forces(equations: ContinuumEquations, state: PathState) -> NDArray[np.f
     multipliers = state.unknowns[equations.moving :]
     for constraint, multiplier in zip(boundary.means, multipliers.tolist(), strict=True):
         force[constraint.node] -= system.unit * multiplier * np.array(constraint.direction)
-    force[boundary.loaded, : boundary.force.shape[1]] += state.load * boundary.force
+    shares = share_at(boundary.force_range, state.load)
+    force[boundary.loaded, : boundary.force.shape[2]] += np.tensordot(
+        shares, boundary.force, axes=1
+    )
     internal = equations.forces(state.unknowns)[: equations.displacements.ndof]
     internal = internal.reshape(mesh.dimension, -1)
     hub_of_element, elements = mesh.hub_of_element, mesh.elements

@@ -14,8 +14,8 @@ import numpy as np
 
 from bellcrank.fem.continuum.backend import ngsolve
 from bellcrank.fem.continuum.laws import lame_of, laws
-from bellcrank.mechanics.frames.system import DEAD
-from bellcrank.model.stroke_ranges import WHOLE, delayed
+from bellcrank.mechanics.frames.system import applied_forces
+from bellcrank.model.stroke_ranges import WHOLE
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from bellcrank.fem.continuum.laws import Lame, Law
     from bellcrank.fem.continuum.mesh import ContinuumMesh
-    from bellcrank.model import NodeForce
     from bellcrank.part.part import Part
 
 ORDER = {2: 4, 3: 2}
@@ -72,26 +71,23 @@ class Boundary:
         Constraints on mean displacements of hubs.
     loaded : (p,) int64
         Lattice nodes whose hubs are loaded by forces.
-    force : (p, d) float64
-        Forces on them at the full load, N.
+    force : (G, p, d) float64
+        Full forces on them, N, those of one range together.
+    force_range : (G, 2) float64
+        Fractions of the load between which they grow; the first is the whole load.
     weight : (d,) float64, optional
         Own weight at the full load, N / mm^3.
-    dead_force : (p, d) float64, optional
-        Forces on the loaded hubs that act before the input, in the first part of the load (`DEAD`);
-        None for an input that begins with the load.
     """
 
     clamped: NDArray[np.int64]
     means: tuple[MeanConstraint, ...]
     loaded: NDArray[np.int64]
     force: NDArray[np.float64]
+    force_range: NDArray[np.float64]
     weight: NDArray[np.float64] | None = None
-    dead_force: NDArray[np.float64] | None = None
 
 
-def boundary_of(
-    part: Part, hubs: NDArray[np.int64], dimension: int, dead_load: NodeForce | None = None
-) -> Boundary:
+def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary:
     """Return the supports and loads of the hubs of a part.
 
     In the mesh of a solid, the mean displacement of driven hubs of a part in the plane, and of
@@ -105,11 +101,8 @@ def boundary_of(
         Lattice nodes that have a hub.
     dimension
         2 for a mesh in the plane, 3 for one in space.
-    dead_load
-        Forces that act before the input, lattice units.
     """
     problem = part.design.problem
-    start = DEAD if dead_load is not None else 0.0
     supports, given = problem.supports, problem.input
     axes = [tuple(row) for row in np.eye(dimension).tolist()]
     across = axes[problem.lattice.dimension :]
@@ -119,10 +112,9 @@ def boundary_of(
         for node in np.intersect1d(nodes, hubs).tolist():
             means += [MeanConstraint(node, axis) for axis in (held, *across)]
     present = np.isin(given.nodes, hubs)
-    total = np.zeros(problem.lattice.positions.shape)
     if given.drive == "displacement":
         full = given.amount * part.scale * given.direction[present]
-        ranges = delayed(given.ranges[present], start).tolist()
+        ranges = given.ranges[present].tolist()
         for node, motion, during in zip(
             given.nodes[present].tolist(), full.tolist(), ranges, strict=True
         ):
@@ -131,23 +123,17 @@ def boundary_of(
                 for axis, move in zip(axes, motion, strict=False)
             ]
             means += [MeanConstraint(node, axis) for axis in across]
-    else:
-        total[given.nodes] += given.amount * given.direction
-    for each in problem.loads.forces:
-        total[each.nodes] += each.force
-    dead = np.zeros_like(total)
-    if dead_load is not None:
-        dead[dead_load.nodes] = dead_load.force
-    loaded = np.intersect1d(np.flatnonzero(total.any(axis=1) | dead.any(axis=1)), hubs)
+    force, force_range = applied_forces(problem, *problem.lattice.positions.shape)
+    loaded = np.intersect1d(np.flatnonzero(force.any(axis=(0, 2))), hubs)
     unit = part.stiffness_unit * part.scale
     weight = problem.loads.weight
     return Boundary(
         np.intersect1d(supports.fixed, hubs),
         tuple(means) + tuple(_springs(part, hubs, axes)),
         loaded,
-        unit * total[loaded],
+        unit * force[:, loaded],
+        force_range,
         None if weight is None else unit / part.scale**3 * weight,
-        None if dead_load is None else unit * dead[loaded],
     )
 
 
@@ -212,7 +198,6 @@ def continuum_system(
     mesh: ContinuumMesh,
     law: str = "neo-hookean",
     order: int | None = None,
-    dead_load: NodeForce | None = None,
 ) -> ContinuumSystem:
     """Return a mesh with the material, supports and loads of its part.
 
@@ -226,8 +211,6 @@ def continuum_system(
         Name in the registry of laws.
     order
         Degree of exact integration of energies; by default 4 in the plane and 2 in space.
-    dead_load
-        Forces that act before the input, lattice units.
 
     Raises
     ------
@@ -237,7 +220,7 @@ def continuum_system(
     dimension = mesh.dimension
     return ContinuumSystem(
         mesh=mesh,
-        boundary=boundary_of(part, mesh.hubs, dimension, dead_load),
+        boundary=boundary_of(part, mesh.hubs, dimension),
         law=laws[law],
         lame=lame_of(part.material),
         unit=part.material.young * part.section.thickness,

@@ -96,7 +96,7 @@ def point_of(part: Part, frame: PartFrame, state: FrameState) -> StrokePoint:
     """Return the figures of an equilibrium."""
     stress, strain = fibre_stress_and_strain(part, frame, state)
     problem = part.design.problem
-    force = state.reaction + state.load * frame.load
+    force = state.reaction + frame.load_at(state.load)
     motion, output = state.displacement[: len(part.positions)], problem.output.nodes
     if len(output) == 1:
         rotation = np.degrees(motion[output[0], 2])

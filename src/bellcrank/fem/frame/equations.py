@@ -15,9 +15,9 @@ from bellcrank.fem.frame.sparse import Assembly, SparseFactor
 from bellcrank.fem.path import Linearisation, PathState
 from bellcrank.mechanics.frames.beams import beam_stiffness, subdivided
 from bellcrank.mechanics.frames.system import (
-    drive_and_load,
-    drive_ramps,
+    applied_forces,
     held_unknowns,
+    prescribed_motion,
     spring_stiffness,
 )
 from bellcrank.model import Elasticity
@@ -55,8 +55,10 @@ class PartFrame:
         Prescribed displacements at the full stroke, mm.
     ramps : (n, 2) float64
         Fractions of the stroke between which nodes of the drive move.
-    load : (n, 3) float64
-        Forces at the full stroke, N.
+    load : (G, n, 3) float64
+        Full forces, N, those of one range together.
+    load_range : (G, 2) float64
+        Fractions of the stroke between which they grow.
     springs : (n, 2, 2) float64
         Stiffness of the springs from the nodes to the ground, N / mm.
     """
@@ -70,7 +72,12 @@ class PartFrame:
     drive: NDArray[np.float64]
     ramps: NDArray[np.float64]
     load: NDArray[np.float64]
+    load_range: NDArray[np.float64]
     springs: NDArray[np.float64]
+
+    def load_at(self, fraction: float) -> NDArray[np.float64]:
+        """Return (n, 3) the forces at a fraction of the stroke, N."""
+        return np.tensordot(share_at(self.load_range, fraction), self.load, axes=1)
 
     @property
     def rest(self) -> NDArray[np.float64]:
@@ -111,7 +118,8 @@ def part_frame(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -
     length = np.linalg.norm(positions[ends[:, 1]] - positions[ends[:, 0]], axis=1)
     ratio = np.repeat(part.width_ratios, elements)
     elasticity = Elasticity(material.young, material.poisson)
-    drive, load = drive_and_load(problem, len(positions), 3)
+    drive, ramps = prescribed_motion(problem, len(positions), 3)
+    load, load_range = applied_forces(problem, len(positions), 3)
     absent = np.ones(len(positions), dtype=bool)
     absent[ends] = False
     there = ~absent[:, None]
@@ -123,8 +131,9 @@ def part_frame(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -
         stiffness=beam_stiffness(part.section, elasticity, length, theory, 2, rigid, ratio),
         held=held_unknowns(problem, len(positions), 3) | ~there,
         drive=part.scale * drive * there,
-        ramps=drive_ramps(problem, len(positions)),
+        ramps=ramps,
         load=part.stiffness_unit * part.scale * load * there,
+        load_range=load_range,
         springs=(part.stiffness_unit * spring_stiffness(problem, len(positions)))[:, :2, :2]
         * there[:, :, None],
     )
@@ -178,8 +187,8 @@ class FrameEquations:
 
     @property
     def kinks(self) -> tuple[float, ...]:
-        """Fractions within the stroke at which an input starts or stops."""
-        return kinks_of(self.frame.ramps)
+        """Fractions within the stroke at which an input or a load starts or stops growing."""
+        return kinks_of(np.concatenate([self.frame.ramps, self.frame.load_range]))
 
     def displacement(self, unknowns: NDArray[np.float64], load: float) -> NDArray[np.float64]:
         """Return (n, 3) the displacements of all nodes."""
@@ -191,7 +200,7 @@ class FrameEquations:
         """Linearise the equations; raises RuntimeError if the stiffness is singular."""
         displacement = self.displacement(unknowns, load)
         force, tangent = self._beams(displacement)
-        residual = (self._sum(force, displacement) - load * self.frame.load).ravel()[self.free]
+        residual = (self._sum(force, displacement) - self.frame.load_at(load)).ravel()[self.free]
         magnitude = float(np.abs(force[:, [0, 1, 3, 4]]).max())
         tolerance = self._residual_tolerance(displacement, magnitude)
         return Linearisation(residual, tolerance, self._factor(tangent))
@@ -203,7 +212,9 @@ class FrameEquations:
         _, tangent = self._beams(self.displacement(unknowns, load))
         drive = rate_at(self.frame.ramps, load, toward)[:, None] * self.frame.drive
         force = self._linear_force(tangent, drive)
-        return (self._sum(force, drive) - self.frame.load).ravel()[self.free]
+        rates = rate_at(self.frame.load_range, load, toward)
+        applied = np.tensordot(rates, self.frame.load, axes=1)
+        return (self._sum(force, drive) - applied).ravel()[self.free]
 
     def distance(self, change: NDArray[np.float64]) -> float:
         """Return the largest component of a change of the displacements, mm."""
@@ -230,7 +241,8 @@ class FrameEquations:
             raise RuntimeError("singular")
         displacement = self.frame.drive.copy()
         given = self._sum(self._linear_force(tangent, displacement), displacement)
-        displacement.ravel()[self.free] = factor.solve((self.frame.load - given).ravel()[self.free])
+        applied = self.frame.load_at(1.0)
+        displacement.ravel()[self.free] = factor.solve((applied - given).ravel()[self.free])
         force = self._linear_force(tangent, displacement)
         return self._state(1.0, displacement, force, self._rest)
 
@@ -242,7 +254,7 @@ class FrameEquations:
         chord: NDArray[np.float64],
     ) -> FrameState:
         """Return a state from the end forces (e, 6) of elements along their chords (e, 2)."""
-        reaction = (self._sum(force, displacement) - load * self.frame.load).ravel()
+        reaction = (self._sum(force, displacement) - self.frame.load_at(load)).ravel()
         reaction[self.free] = 0.0
         axial = (force[:, 3:5] * chord).sum(axis=1) / np.linalg.norm(chord, axis=1)
         resultants = np.column_stack([axial, force[:, 2], force[:, 5]])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from bellcrank.mechanics.analysis import Strain
+from bellcrank.model.stroke_ranges import share_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -258,7 +259,8 @@ def input_forces(equilibrium: Equilibrium) -> Floats:
     """Return (i, d) the external force on each input node."""
     given = equilibrium.problem.input
     if given.drive == "force":
-        return np.array(equilibrium.fraction * given.amount * given.direction)
+        share = share_at(given.ranges, equilibrium.fraction)
+        return np.array(given.amount * share[:, None] * given.direction)
     reactions: Floats = equilibrium.residual()[given.nodes, : given.direction.shape[1]]
     return reactions
 

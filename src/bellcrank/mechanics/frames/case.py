@@ -15,7 +15,7 @@ import numpy as np
 
 from bellcrank.mechanics.frames.evaluator import FrameEvaluator
 from bellcrank.mechanics.frames.output_loads import (
-    resisting_force,
+    with_dead_load,
     with_held_output,
     with_output,
     with_payload,
@@ -231,9 +231,9 @@ class CaseEvaluator:
                 loaded = with_payload(self._by_output[output], force)
                 made = FrameEvaluator(loaded, "displacement", elements)
             elif load == "dead load":
-                carried = self._by_output[output]
-                dead = resisting_force(carried, self.forces[Channel("carried_motion", output)])
-                made = FrameEvaluator(carried, "displacement", elements, dead_load=dead)
+                force = self.forces[Channel("carried_motion", output)]
+                carried = with_dead_load(self._by_output[output], force)
+                made = FrameEvaluator(carried, "displacement", elements)
             else:
                 held = with_held_output(self._by_output[output])
                 made = FrameEvaluator(held, "displacement", elements)

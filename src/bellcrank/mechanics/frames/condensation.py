@@ -143,7 +143,6 @@ def _bounded(problem: Problem, held: NDArray[np.bool_]) -> Frame:
         has_ramps=False,
         kinks=np.zeros(0),
         load=np.zeros_like(frame.load),
-        dead_load=np.zeros_like(frame.load),
-        start=0.0,
+        load_range=np.tile(WHOLE, (len(frame.load), 1)),
         ground=np.zeros_like(frame.ground),
     )

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from bellcrank.mechanics.frames.kernels.arrays import State
     from bellcrank.mechanics.frames.quantities import Measures, Quantity
     from bellcrank.mechanics.output import OutputMotion
-    from bellcrank.model import NodeForce, Problem
+    from bellcrank.model import Problem
 
 
 class FrameEvaluator:
@@ -64,8 +64,6 @@ class FrameEvaluator:
         deformation.
     weight : (d,), optional
         Own weight: force on a unit of volume. It is applied with the input.
-    dead_load
-        Forces that act before the input and during it.
 
     Raises
     ------
@@ -84,7 +82,6 @@ class FrameEvaluator:
         elements: int | None = None,
         theory: str = "euler-bernoulli",
         weight: ArrayLike | None = None,
-        dead_load: NodeForce | None = None,
     ) -> None:
         if elements is not None and (not isinstance(elements, int) or elements < 1):
             raise InvalidSettings(f"elements: expected at least 1 in each beam, got {elements!r}")
@@ -97,7 +94,6 @@ class FrameEvaluator:
         self.divisions = elements or 1
         self.theory = theory
         self.weight = None if weight is None else np.asarray(weight, dtype=np.float64)
-        self.dead_load = dead_load
         self._mask: NDArray[np.bool_] | None = None
         self._given = np.zeros(problem.lattice.beam_count, np.uint8)
         self._last: tuple[NDArray[np.bool_], Response] | None = None
@@ -111,7 +107,7 @@ class FrameEvaluator:
         every = np.ones(self.problem.lattice.beam_count, dtype=bool)
         self.beams = np.flatnonzero(every if mask is None else mask)
         self.frame = build_frame(
-            self.problem, objective, self.elements, self.theory, mask, self.weight, self.dead_load
+            self.problem, objective, self.elements, self.theory, mask, self.weight
         )
         self.structure = allocate_structure(self.frame)
         self.memory = allocate_memory(self.frame, self.structure)

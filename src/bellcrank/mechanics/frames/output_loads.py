@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from bellcrank.model import Loads, NodeForce, Specification
+import numpy as np
+
+from bellcrank.model import NodeForce, Specification
+from bellcrank.model.stroke_ranges import delayed
 
 if TYPE_CHECKING:
     from bellcrank.model import Problem
 
+DEAD = 0.25
+"""Part of the load in which a dead load grows, before the input."""
 STOP_STIFFNESS = 2e5
 """Stiffness of the springs that hold the output, over the axial stiffness of a beam as long as it
 is wide: it does not depend on the geometry, by which blocked forces are differentiated."""
@@ -55,7 +60,39 @@ def with_payload(problem: Problem, force: float) -> Problem:
     """
     given = problem.loads
     forces = (*given.forces, resisting_force(problem, force))
-    return replace(problem, loads=Loads(forces, given.springs, given.weight))
+    return replace(problem, loads=replace(given, forces=forces))
+
+
+def with_dead_load(problem: Problem, force: float) -> Problem:
+    """Return a problem with a force on its output that acts before the input and during it.
+
+    It grows in the first part of the load (`DEAD`), the input and the other forces in the rest; the
+    own weight grows in all of it.
+
+    Parameters
+    ----------
+    force
+        Total force against the wanted direction, shared equally by the output nodes.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> from bellcrank.part import PartSpec, frame_problem
+    >>> crane = frame_problem(find_problem("crane"), PartSpec())
+    >>> loaded = with_dead_load(crane, 0.1)
+    >>> loaded.loads.forces[0].during, loaded.input.ranges[0].tolist()
+    ((0.0, 0.25), [0.25, 1.0])
+    """
+    dead = replace(resisting_force(problem, force), during=(0.0, DEAD))
+    forces = [
+        replace(each, during=tuple(delayed(np.array([each.range]), DEAD)[0].tolist()))
+        for each in problem.loads.forces
+    ]
+    return replace(
+        problem,
+        input=replace(problem.input, during=delayed(problem.input.ranges, DEAD)),
+        loads=replace(problem.loads, forces=(dead, *forces)),
+    )
 
 
 def resisting_force(problem: Problem, force: float) -> NodeForce:

@@ -24,17 +24,14 @@ from bellcrank.mechanics.frames.kernels.arrays import (
 )
 from bellcrank.mechanics.ordering import elimination_order, factor_size
 from bellcrank.mechanics.system import EFFICIENCY_TOLERANCE, incident_beams
-from bellcrank.model.stroke_ranges import WHOLE, delayed, kinks_of
+from bellcrank.model.stroke_ranges import WHOLE
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from bellcrank.mechanics.kernels.arrays import Floats
     from bellcrank.mechanics.objectives import Objective
-    from bellcrank.model import NodeForce, Problem
-
-DEAD = 0.25
-"""Part of the load in which dead loads grow, before the input."""
+    from bellcrank.model import Problem
 
 
 def allocate_state(nodes: int, size: int) -> State:
@@ -146,23 +143,34 @@ def held_unknowns(problem: Problem, nodes: int, size: int) -> NDArray[np.bool_]:
     return held
 
 
-def drive_and_load(problem: Problem, nodes: int, size: int) -> tuple[Floats, Floats]:
-    """Return (nodes, size) the prescribed motion and the forces at full load."""
-    drive, load = np.zeros((nodes, size)), np.zeros((nodes, size))
+def prescribed_motion(problem: Problem, nodes: int, size: int) -> tuple[Floats, Floats]:
+    """Return (nodes, size) the full motion of the drive and (nodes, 2) the ranges of its nodes.
+
+    The ranges are the fractions of the load between which they move.
+    """
+    drive, ramps = np.zeros((nodes, size)), np.tile(WHOLE, (nodes, 1))
     given = problem.input
-    target = drive if given.drive == "displacement" else load
-    dimension = problem.lattice.dimension
-    target[given.nodes, :dimension] = given.amount * given.direction
-    for each in problem.loads.forces:
-        load[each.nodes, :dimension] += each.force
-    return drive, load
+    if given.drive == "displacement":
+        drive[given.nodes, : problem.lattice.dimension] = given.amount * given.direction
+        ramps[given.nodes] = given.ranges
+    return drive, ramps
 
 
-def drive_ramps(problem: Problem, nodes: int) -> Floats:
-    """Return (nodes, 2) the fractions of the load between which nodes of the drive move."""
-    ramps = np.tile(WHOLE, (nodes, 1))
-    ramps[problem.input.nodes] = problem.input.ranges
-    return ramps
+def applied_forces(problem: Problem, nodes: int, size: int) -> tuple[Floats, Floats]:
+    """Return (G, nodes, size) the full forces and (G, 2) the fractions between which they grow.
+
+    Forces with the same range are one group; the first one is that of the whole load.
+    """
+    groups = {WHOLE: np.zeros((nodes, size))}
+    axes, given = slice(problem.lattice.dimension), problem.input
+    forces = [(each.range, each.nodes, each.force) for each in problem.loads.forces]
+    if given.drive == "force":
+        pushes = zip(given.ranges.tolist(), given.nodes, given.direction, strict=True)
+        forces += [((begin, end), at, given.amount * along) for (begin, end), at, along in pushes]
+    for span, at, force in forces:
+        group = groups.setdefault(span, np.zeros((nodes, size)))
+        group[at, axes] += force
+    return np.array(list(groups.values())), np.array(list(groups))
 
 
 def spring_stiffness(problem: Problem, nodes: int) -> Floats:
@@ -194,7 +202,6 @@ def build_frame(
     theory: str = "euler-bernoulli",
     mask: NDArray[np.bool_] | None = None,
     weight: Floats | None = None,
-    dead_load: NodeForce | None = None,
 ) -> Frame:
     """Convert a problem with a section to the arrays of a frame.
 
@@ -209,9 +216,6 @@ def build_frame(
         Beams of the lattice that the frame has; all by default.
     weight : (d,), optional
         Force on a unit of volume; by default that of the problem.
-    dead_load
-        Forces that act before the stroke and during it. They grow in the first part of the load
-        (`DEAD`), the input and the loads of the problem in the rest.
 
     Raises
     ------
@@ -236,13 +240,9 @@ def build_frame(
     nodes = len(positions)
     held = held_unknowns(problem, nodes, size)
     any_held, all_held = np.asarray(held.any(axis=1)), np.asarray(held.all(axis=1))
-    drive, load = drive_and_load(problem, nodes, size)
-    dead, start = np.zeros((nodes, size)), 0.0
-    if dead_load is not None:
-        dead[dead_load.nodes, :dimension] = dead_load.force
-        start = DEAD
-    ramps = delayed(drive_ramps(problem, nodes), start)
-    kinks = kinks_of(ramps)
+    drive, ramps = prescribed_motion(problem, nodes, size)
+    load, load_range = applied_forces(problem, nodes, size)
+    kinks = problem.kinks
     protected = any_held.astype(np.uint8)
     protected[problem.special_nodes] = 1
     grounded, prescribed = np.zeros(nodes, np.uint8), np.zeros(nodes, np.uint8)
@@ -287,8 +287,7 @@ def build_frame(
         has_ramps=len(kinks) > 0,
         kinks=np.array(kinks, dtype=np.float64),
         load=load,
-        dead_load=dead,
-        start=start,
+        load_range=load_range,
         weight=of_beam,
         has_weight=weight is not None,
         ground=ground,

@@ -68,15 +68,14 @@ class Frame(Bundle):
     ramp: Floats
     """(N, 2) fractions of the load between which a node of the drive moves."""
     has_ramps: bool
-    """Whether these differ from 0 and 1."""
+    """Whether these, or those of forces, differ from 0 and 1."""
     kinks: Floats
-    """Fractions within the load at which a node of the drive starts or stops, ascending."""
+    """Fractions within the load at which a range of the drive or of forces begins or ends,
+    ascending."""
     load: Floats
-    """(N, b) force and moment at full load."""
-    dead_load: Floats
-    """(N, b) force and moment that act before the drive and the other loads."""
-    start: float
-    """Fraction of the load at which these begin; 0 without dead loads."""
+    """(G, N, b) full forces and moments, those of one range together."""
+    load_range: Floats
+    """(G, 2) fractions of the load between which they grow."""
     weight: Floats
     """(M, 3) force on each beam at full load, one half on either end."""
     has_weight: bool

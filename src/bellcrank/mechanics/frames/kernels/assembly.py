@@ -21,9 +21,9 @@ from bellcrank.mechanics.frames.kernels.plane import (
     plane_stiffness,
 )
 from bellcrank.mechanics.frames.kernels.state import (
-    dead_share,
     drive_rate,
-    load_share,
+    force_rate,
+    force_share,
     move_node,
 )
 from bellcrank.mechanics.kernels._compile import inlined, kernel
@@ -81,12 +81,12 @@ def add_loads(
 ) -> None:
     """Add the forces of loads, own weight and springs to the gradient."""
     size = len(frame.unit)
-    share, dead = load_share(frame, fraction), dead_share(frame, fraction)
-    for index in range(structure.sizes[0]):
-        node = structure.order[index]
-        for axis in range(size):
-            gradient[node, axis] -= share * frame.load[node, axis]
-            gradient[node, axis] -= dead * frame.dead_load[node, axis]
+    for group in range(len(frame.load)):
+        share = force_share(frame, group, fraction)
+        for index in range(structure.sizes[0]):
+            node = structure.order[index]
+            for axis in range(size):
+                gradient[node, axis] -= share * frame.load[group, node, axis]
     for node in frame.spring_nodes:
         for i in range(3):
             for j in range(3):
@@ -97,7 +97,7 @@ def add_loads(
             for end in range(2):
                 node = frame.beams[beam, end]
                 for axis in range(dimension(frame)):
-                    gradient[node, axis] -= 0.5 * share * frame.weight[beam, axis]
+                    gradient[node, axis] -= 0.5 * fraction * frame.weight[beam, axis]
 
 
 @kernel
@@ -366,6 +366,21 @@ def add_driven_rate(
 
 
 @kernel
+def set_force_rate(frame: Frame, structure: Structure, within: float, rate: Floats) -> None:
+    """Set (N, b) the derivative of the gradient by the load to that of the forces."""
+    size = len(frame.unit)
+    for node in range(len(rate)):
+        for axis in range(size):
+            rate[node, axis] = 0.0
+    for group in range(len(frame.load)):
+        speed = force_rate(frame, group, within)
+        for node in range(len(rate)):
+            if structure.active[node]:
+                for axis in range(size):
+                    rate[node, axis] -= speed * frame.load[group, node, axis]
+
+
+@kernel
 def find_load_rate(
     frame: Frame, structure: Structure, state: State, within: float, rate: Floats, memory: Memory
 ) -> None:
@@ -373,22 +388,14 @@ def find_load_rate(
 
     `within` is a load on the side of the derivative, up to the next kink.
     """
-    size, start = len(frame.unit), frame.start
-    speed = 1.0 / (1.0 - start) if within > start else 0.0
-    dead_speed = 1.0 / start if within < start else 0.0
-    for node in range(len(rate)):
-        for axis in range(size):
-            rate[node, axis] = 0.0
-            if structure.active[node]:
-                rate[node, axis] -= speed * frame.load[node, axis]
-                rate[node, axis] -= dead_speed * frame.dead_load[node, axis]
+    set_force_rate(frame, structure, within, rate)
     for index in range(structure.sizes[1]):
         beam = structure.beam[index]
         first, second = frame.beams[beam, 0], frame.beams[beam, 1]
         if frame.has_weight:
             for axis in range(dimension(frame)):
-                rate[first, axis] -= 0.5 * speed * frame.weight[beam, axis]
-                rate[second, axis] -= 0.5 * speed * frame.weight[beam, axis]
+                rate[first, axis] -= 0.5 * frame.weight[beam, axis]
+                rate[second, axis] -= 0.5 * frame.weight[beam, axis]
         if not (frame.prescribed[first] or frame.prescribed[second]):
             continue
         add_driven_rate(frame, state, beam, within, rate, memory)

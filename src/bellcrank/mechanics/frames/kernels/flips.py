@@ -33,7 +33,6 @@ from bellcrank.mechanics.frames.kernels.assembly import (
 from bellcrank.mechanics.frames.kernels.beams import axial_force, beam_tangent, dimension
 from bellcrank.mechanics.frames.kernels.factor import couple, entry_of, fill_in
 from bellcrank.mechanics.frames.kernels.response import add_efficiency_gradient, efficiency_of
-from bellcrank.mechanics.frames.kernels.state import load_share
 from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.fields import clear
 
@@ -239,7 +238,7 @@ def set_right_sides(
         matrix[a, 2 * size] = sign * memory.force[a]
     if frame.has_weight:
         for axis in range(dimension(frame)):
-            half = 0.5 * sign * load_share(frame, fraction) * frame.weight[beam, axis]
+            half = 0.5 * sign * fraction * frame.weight[beam, axis]
             matrix[axis, 2 * size] -= half
             matrix[size + axis, 2 * size] -= half
     for number in range(len(motions)):

@@ -12,7 +12,6 @@ from bellcrank.mechanics.frames.kernels.beams import (
 )
 from bellcrank.mechanics.frames.kernels.plane import plane_deformations
 from bellcrank.mechanics.frames.kernels.space_angles import add_cross
-from bellcrank.mechanics.frames.kernels.state import load_share
 from bellcrank.mechanics.kernels._compile import entry, kernel
 
 if TYPE_CHECKING:
@@ -277,7 +276,7 @@ def add_weight_products(
         pulled = 0.0
         for axis in range(by_position.shape[2]):
             both = adjoints[k, first, axis] + adjoints[k, second, axis]
-            pulled += 0.5 * load_share(frame, fraction) * frame.weight[beam, axis] * both
+            pulled += 0.5 * fraction * frame.weight[beam, axis] * both
         for axis in range(by_position.shape[2]):
             along = pulled * frame.rest[beam, 0, axis] / (length * length)
             by_position[k, second, axis] -= along

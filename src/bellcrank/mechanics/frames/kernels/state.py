@@ -130,15 +130,17 @@ def difference(start: State, end: State, out: Floats) -> None:
 
 
 @kernel
-def load_share(frame: Frame, fraction: float) -> float:
-    """Return the part of forces and own weight that acts at a load."""
-    return max(0.0, (fraction - frame.start) / (1.0 - frame.start))
+def force_share(frame: Frame, group: int, fraction: float) -> float:
+    """Return the part of the full forces of a group that acts at a load."""
+    begin, end = frame.load_range[group, 0], frame.load_range[group, 1]
+    return min(1.0, max(0.0, (fraction - begin) / (end - begin)))
 
 
 @kernel
-def dead_share(frame: Frame, fraction: float) -> float:
-    """Return the part of the dead load that acts at a load."""
-    return min(1.0, fraction / frame.start) if frame.start > 0.0 else 0.0
+def force_rate(frame: Frame, group: int, within: float) -> float:
+    """Return the derivative of `force_share` by the load; `within` is between two kinks."""
+    begin, end = frame.load_range[group, 0], frame.load_range[group, 1]
+    return 1.0 / (end - begin) if begin < within < end else 0.0
 
 
 @kernel
@@ -161,7 +163,7 @@ def drive_rate(frame: Frame, node: int, within: float) -> float:
 
 @kernel
 def is_kink(frame: Frame, load: float) -> bool:
-    """Whether a node of the drive starts or stops at a load."""
+    """Whether a range of the drive or of forces begins or ends at a load."""
     found = False
     for kink in frame.kinks:
         found |= kink == load

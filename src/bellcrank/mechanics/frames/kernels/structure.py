@@ -191,7 +191,8 @@ def classify_piece(
         if frame.grounded[node]:
             return CONVERGED
         for axis in range(size):
-            follows &= frame.load[node, axis] == 0.0 and frame.dead_load[node, axis] == 0.0
+            for group in range(len(frame.load)):
+                follows &= frame.load[group, node, axis] == 0.0
             if frame.held[node, axis] and not frame.prescribed[node]:
                 follows = False
         for axis in range(3):

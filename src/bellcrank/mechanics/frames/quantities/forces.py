@@ -17,6 +17,7 @@ from bellcrank.mechanics.frames.quantities.definition import (
     quantities,
 )
 from bellcrank.mechanics.frames.quantities.motion import along_weights
+from bellcrank.model.stroke_ranges import share_at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -153,7 +154,8 @@ def mean_weights(problem: Problem) -> Weights:
 
 def _sag(equilibrium: Equilibrium) -> Measures:
     """Measure the linear motion of the output by the own weight alone."""
-    load = equilibrium.fraction * equilibrium.frame.load
+    frame = equilibrium.frame
+    load = np.tensordot(share_at(frame.load_range, equilibrium.fraction), frame.load, axes=1)
     motion = equilibrium.solve(-equilibrium.residual() - load)
     if motion is None:
         return Measures(np.full(equilibrium.problem.lattice.dimension, math.nan))

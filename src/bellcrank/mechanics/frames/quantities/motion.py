@@ -18,6 +18,7 @@ from bellcrank.mechanics.frames.quantities.definition import (
     ratio,
 )
 from bellcrank.mechanics.output import motion_weights, off_axis_of, rotation_of, turned_positions
+from bellcrank.model.stroke_ranges import share_at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -163,8 +164,14 @@ quantities.register("rotation")(
 
 
 def _load_share(equilibrium: Equilibrium) -> float:
-    """Return the fraction of the load, by which a constant denominator is multiplied."""
-    return 1.0 if math.isnan(equilibrium.frame.denominator) else equilibrium.fraction
+    """Return the part of the input, by which a constant denominator is multiplied.
+
+    nan before the input begins to grow.
+    """
+    share = float(share_at(equilibrium.problem.input.ranges, equilibrium.fraction).mean())
+    if share == 0.0:
+        return math.nan
+    return 1.0 if math.isnan(equilibrium.frame.denominator) else share
 
 
 def _efficiency(equilibrium: Equilibrium) -> Measures:

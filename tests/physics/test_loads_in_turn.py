@@ -1,0 +1,188 @@
+"""Loads that grow in a part of the stroke, such as weights that act before the input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bellcrank.fem.frame.equations import FrameEquations, part_frame
+from bellcrank.fem.path import PathStatus, follow_path
+from bellcrank.mechanics import (
+    VERIFICATION_INCREMENT,
+    CaseEvaluator,
+    Channel,
+    FrameEvaluator,
+    Status,
+)
+from bellcrank.model import Input, Loads, NodeForce, Section, problem_from_dict, problem_to_dict
+from bellcrank.task import Task, task_from_dict
+from bellcrank.workflows.condition_texts import condition_texts
+from bellcrank.workflows.loading import loading_path
+
+from .frames import chain
+
+INPUT = {"at": {"point": [56, 53]}, "direction": "left", "displacement": "3 mm"}
+LOAD = {"at": {"point": [11, 53]}, "direction": "down", "force": "40 g"}
+TASK = {
+    "name": "hanging",
+    "domain": {"size": ["62 mm", "54 mm"]},
+    "supports": [{"at": {"edge": "bottom"}}],
+    "cases": [
+        {
+            "inputs": [{**INPUT, "during": ["20%", "100%"]}],
+            "loads": [{**LOAD, "during": ["0%", "20%"]}],
+            "outputs": [{"at": {"point": [11, 53]}, "direction": "left", "travel": "1 mm"}],
+        }
+    ],
+}
+
+
+def hanging(**changes: object) -> Task:
+    """Return the task with other inputs or loads."""
+    return task_from_dict({**TASK, "cases": [{**TASK["cases"][0], **changes}]})
+
+
+def response(task: Task, elements: int | None = None) -> FrameEvaluator:
+    """Return an evaluator after the response of the full lattice."""
+    evaluator = FrameEvaluator(task.problem, "displacement", elements)
+    found = evaluator.evaluate(task.problem.initial, VERIFICATION_INCREMENT)
+    assert found.status is Status.CONVERGED
+    return evaluator
+
+
+def moved(evaluator: FrameEvaluator, fraction: float) -> np.ndarray:
+    """Return (N, 2) the displacements at a fraction of the stroke."""
+    found = evaluator.end if fraction == 1.0 else evaluator.equilibrium(fraction)
+    assert found is not None
+    return found.state.u[: evaluator.problem.lattice.node_count, :2].copy()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_bars_stretch_by_the_forces_that_act_so_far(dimension: int) -> None:
+    positions = np.zeros((3, dimension))
+    positions[:, 0] = range(3)
+    along = np.eye(dimension)[0]
+    section = Section.round(0.1) if dimension == 3 else Section(0.1, 1.0)
+    force = 1e-6
+    problem = chain(
+        positions,
+        input=Input([2], along, "force", force, during=(0.5, 1.0)),
+        section=section,
+        loads=Loads(forces=(NodeForce([1], 3.0 * force * along, during=(0.0, 0.5)),)),
+    )
+    assert problem.kinks == (0.5,)
+    evaluator = FrameEvaluator(problem, "displacement")
+    assert evaluator.evaluate(problem.initial).status is Status.CONVERGED
+    stretch = force / (problem.material.young * section.area)
+    for fraction, first, last in [(0.25, 1.5, 0.0), (0.5, 3.0, 0.0), (0.75, 3.0, 0.5), (1.0, 3, 1)]:
+        found = moved(evaluator, fraction)[:, 0] / stretch
+        assert found == pytest.approx([0.0, first + last, first + 2.0 * last], abs=1e-4)
+
+
+@pytest.mark.parametrize("elements", [None, 2])
+def test_a_weight_acts_before_the_input_and_is_held(elements: int | None) -> None:
+    evaluator = response(hanging(), elements)
+    alone = {**LOAD, "during": ["0%", "20%"]}
+    # The input node rests while the weight grows: that is a support.
+    still = {**INPUT, "displacement": "0.02 mm", "during": ["20%", "100%"]}
+    weighed = moved(response(hanging(inputs=[still], loads=[alone]), elements), 0.2)
+    assert np.abs(weighed).max() > 0.005
+    assert moved(evaluator, 0.2) == pytest.approx(weighed, abs=1e-7)
+    half = 0.5 * weighed[evaluator.problem.output.nodes]
+    assert moved(evaluator, 0.1)[evaluator.problem.output.nodes] == pytest.approx(half, rel=0.2)
+    together = response(hanging(inputs=[INPUT], loads=[LOAD]), elements)
+    assert moved(evaluator, 1.0) == pytest.approx(moved(together, 1.0), abs=1e-7)
+    assert np.abs(moved(evaluator, 0.6) - moved(together, 0.6)).max() > 0.1 * np.abs(weighed).max()
+
+
+def test_finite_elements_follow_the_same_path() -> None:
+    task = hanging()
+    part = task.part.of(task.problem.full_design())
+    equations = FrameEquations(part_frame(part, 8))
+    assert equations.kinks == (0.2,)
+    path = follow_path(equations)
+    assert path.status is PathStatus.CONVERGED
+    evaluator = response(task, 8)
+    count = task.problem.lattice.node_count
+    assert 0.2 in [state.load for state in path.states]
+    for state in path.states[1:]:
+        found = equations.complete(state).displacement[:count, :2] / part.scale
+        assert found == pytest.approx(moved(evaluator, state.load), abs=1e-6)
+
+
+@pytest.mark.parametrize("toward", [0.0, 1.0])
+def test_the_load_derivative_has_the_sides_of_a_kink(toward: float) -> None:
+    task = hanging()
+    equations = FrameEquations(part_frame(task.part.of(task.problem.full_design()), 1))
+    here, step = np.zeros(equations.count), 1e-6 * (1.0 if toward else -1.0)
+    residuals = [equations.linearise(here, load).residual for load in (0.2, 0.2 + step)]
+    expected = (residuals[1] - residuals[0]) / step
+    found = equations.load_derivative(here, 0.2, toward)
+    assert found == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
+
+
+@pytest.mark.slow
+def test_the_sheet_hangs_alike() -> None:
+    pytest.importorskip("ngsolve")
+    from bellcrank.fem.continuum.response import solve_plane
+
+    task = hanging()
+    part = task.part.of(task.problem.full_design())
+    states = {state.load: state for state in solve_plane(part, size=1.0).states}
+    evaluator, output = response(task, 8), task.problem.output.nodes
+    weighed = moved(evaluator, 0.2)[output]
+    assert states[0.2].motion[output] / part.scale == pytest.approx(weighed, rel=0.1)
+    difference = states[1.0].motion[output] / part.scale - moved(evaluator, 1.0)[output]
+    assert np.linalg.norm(difference) < 0.05 * task.problem.input.amount
+    weight = states[0.2].force[output].sum(axis=0)
+    assert weight == pytest.approx([0.0, -0.04 * 9.80665])
+
+
+def test_flips_are_predicted_under_a_weight() -> None:
+    problem = hanging().problem
+    case = CaseEvaluator(problem)
+    channel = Channel("motion", "output")
+    fractions = [0.2, 0.6, 1.0]
+    mask = problem.initial.copy()
+    assert case.respond(mask).status is Status.CONVERGED
+    values = case.values([channel], fractions)
+    beams = problem.designable[::7]
+    predicted = case.predict_flips(values, beams)
+    assert predicted is not None
+    differences = []
+    for beam, guess in zip(beams, predicted[0][channel], strict=True):
+        flipped = mask.copy()
+        flipped[beam] ^= True
+        if case.respond(flipped).status is Status.CONVERGED:
+            exact = case.values([channel], fractions)[channel]
+            change = np.abs(exact - values[channel]).max()
+            differences.append(np.abs(guess - exact).max() / max(change, 1e-6))
+    assert len(differences) > 10
+    assert np.median(differences) < 0.1
+
+
+def test_a_movie_begins_with_the_weight() -> None:
+    task = hanging()
+    path = loading_path(task.problem.full_design(), np.array([0.0, 0.1, 0.2, 0.6, 1.0]))
+    given = task.problem.input
+    pushed = (path.displacement[:, given.nodes] * given.direction).sum(axis=(1, 2)) / given.amount
+    assert pushed == pytest.approx([0.0, 0.0, 0.0, 0.5, 1.0], abs=1e-6)
+    fallen = path.displacement[:, task.problem.output.nodes, 1].mean(axis=1)
+    assert fallen[2] < fallen[1] < fallen[0] == 0.0
+
+
+def test_ranges_of_loads_are_written_read_and_shown() -> None:
+    task = hanging()
+    problem = task.problem
+    data = problem_to_dict(problem)
+    assert data["loads"]["forces"][0]["during"] == [0.0, 0.2]
+    again = problem_from_dict(data)
+    assert again.hash == problem.hash
+    assert again.kinks == (0.2,)
+    whole = hanging(inputs=[INPUT], loads=[{**LOAD, "during": ["0%", "100%"]}]).problem
+    assert not whole.has_ranges
+    assert whole.hash == hanging(inputs=[INPUT], loads=[LOAD]).problem.hash
+    assert condition_texts(problem, task.part) == [
+        "input 3 mm left, from 20% to 100% of the stroke",
+        "load of 0.392 N in all down on 1 node, grows from 0% to 20% of the stroke",
+    ]
