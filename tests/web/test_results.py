@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -114,24 +116,38 @@ def test_the_share_of_a_computation_is_0_when_it_begins(tmp_path: Path) -> None:
     """Without a share, it waits for others."""
     path = tmp_path / "crane.share"
     write = ShareFile(str(path))
-    assert float(path.read_text()) == 0.0
+    assert float(path.read_text().split()[0]) == 0.0
     write(0.5)
-    assert float(path.read_text()) == 0.5
+    assert float(path.read_text().split()[0]) == 0.5
 
 
-def test_a_running_computation_has_the_share_that_it_writes(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("written", "left"), [("0.250 60.0", 170), ("0.900 60.0", None), ("0.000 0.1", None)]
+)
+def test_a_running_computation_has_the_share_and_times(
+    tmp_path: Path, written: str, left: int | None
+) -> None:
+    """After 60 s for a quarter 180 s are left, of which 10 s have passed; none late or at first."""
+
     async def run() -> None:
         results, go_on = StoredResults(tmp_path / "results"), asyncio.Event()
 
         async def compute(share: Path) -> dict[str, Any]:
-            share.write_text("0.250")
+            share.write_text(written)
+            before = time.time() - 10.0
+            os.utime(share, (before, before))
             await go_on.wait()
             return {"stress": 0.5}
 
         task = asyncio.create_task(results.get("crane", compute))
         for _ in range(3):
             await asyncio.sleep(0)
-        assert results.state("crane") == {"share": 0.25}
+        share, seconds = (float(each) for each in written.split())
+        found = results.state("crane")
+        assert found is not None
+        assert found["share"] == share
+        assert found["seconds"] == pytest.approx(seconds + 10.0, abs=1.0)
+        assert found["left"] == (None if left is None else pytest.approx(left, abs=1))
         go_on.set()
         await task
         assert results.state("crane") == {"result": {"stress": 0.5}}

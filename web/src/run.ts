@@ -196,7 +196,10 @@ export class RunPage {
     const specified = Boolean(this.run.problem.specification);
     const tried = this.update?.tried;
     const refined = this.update?.refined;
-    const refining = refined && `${count(refined.designs, "design")}, ${count(refined.geometries, "shape")} computed${refined.sheets ? `, ${count(refined.sheets, "check")} ${isInSpace(this.run.problem) ? "with deviations of the print" : "in the 2D solid"}` : ""}`;
+    // No time left: a refinement ends when it gains nothing more, often long before its largest number of shapes.
+    const pace = running && refined?.seconds != null ? `, ${figure(refined.seconds, refined.seconds < 1 ? 2 : refined.seconds < 10 ? 1 : 0)} s each; it can end earlier` : "";
+    const bound = refined && refined.geometries < refined.most ? ` of at most ${run.refine ? "" : "about "}${refined.most.toLocaleString("en")}` : "";
+    const refining = refined && `${count(refined.designs, "design")}, ${refined.geometries.toLocaleString("en")}${bound} shapes${pace}${refined.sheets ? `, ${count(refined.sheets, "check")} ${isInSpace(this.run.problem) ? "with deviations of the print" : "in the 2D solid"}` : ""}`;
     const phase = refined ? "refinement" : tried ? "verification" : "search";
     const phases = ["search", "verification", ...(specified ? ["refinement"] : [])];
     const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${count(done, "shape")} computed`)]] : [

@@ -157,6 +157,24 @@ def sheet_records(
     return records
 
 
+def path_count(problem: Problem, case: str) -> int:
+    """Return the number of paths to the full stroke that the items of a load case need.
+
+    Parameters
+    ----------
+    problem
+        Problem with a specification.
+    case
+        Name of the load case.
+    """
+    wanted = problem.specification
+    assert wanted is not None
+    terms: list[Item | ObjectiveTerm] = [*wanted.items, *wanted.maximise]
+    own = [each for each in terms if each.case == case]
+    needed = {channel for each in own for channel in channels_of(each.quantity, each.output)}
+    return 1 + sum(channel.name in OWN_PATHS for channel in needed)
+
+
 class _Sheet:
     """Channels of one load case in the sheet."""
 

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import hashlib
 import json
+import time
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,8 @@ MOST_RESULTS = 64
 """Number of results in memory, up to two megabytes each."""
 MOST_FILES = 256
 """Number of results in files."""
+LEAST_SHARE = 0.02
+"""Share that is done from which on the time left is estimated."""
 
 
 class Results:
@@ -123,10 +126,11 @@ class StoredResults:
         """Return what is known of a computation: ``result``, or ``share`` while it runs.
 
         None if it was not begun, or if it does not run and only that is asked for. The share is
-        None if it is not known.
+        None if it is not known; ``seconds`` are those since the computation began, ``left`` those
+        that it still takes if it goes on as fast as so far, None if that is not known.
         """
         if self._results.is_running(key):
-            return {"share": _share(self._path(key, "share"))}
+            return _progress(self._path(key, "share"))
         found = None if running else self._stored(key)
         return None if found is None else {"result": found}
 
@@ -170,9 +174,16 @@ class StoredResults:
             path.unlink(missing_ok=True)
 
 
-def _share(path: Path) -> float | None:
-    """Return the fraction that a computation has written; None if there is none yet."""
+def _progress(path: Path) -> dict[str, float | None]:
+    """Return the fraction that a computation has written, the seconds so far, and those left."""
     try:
-        return float(path.read_text(encoding="ascii"))
+        share, seconds = (float(each) for each in path.read_text(encoding="ascii").split())
+        since = max(time.time() - path.stat().st_mtime, 0.0)
     except (OSError, ValueError):
-        return None
+        return {"share": None, "seconds": None, "left": None}
+    left = seconds * (1.0 - share) / share - since if share >= LEAST_SHARE else -1.0
+    return {
+        "share": share,
+        "seconds": round(seconds + since),
+        "left": round(left) if left > 0.0 else None,
+    }
