@@ -29,6 +29,20 @@ def test_an_output_that_turns_needs_no_direction(page: Any) -> None:
     )
 
 
+def test_the_list_of_what_is_asked_has_inputs_loads_and_limits_that_hold(page: Any) -> None:
+    page.get_by_label("or start from").select_option("selector")
+    asked = page.get_by_role("list", name="Inputs and loads")
+    until(page, lambda: asked.locator("li").count() == 2)
+    first, second = asked.locator("li").all_inner_texts()
+    assert first.startswith("A: Input 3 mm right on 3 nodes between (")
+    assert second.startswith("B: Input 3 mm left ")
+    section(page, "limits")
+    page.get_by_text("empty: 65 %, that of NinjaFlex").wait_for()
+    section(page, "domain")
+    page.get_by_label("Material").select_option("tpu-95a")
+    page.get_by_text("empty: not limited, no limit of TPU 95A is known").wait_for()
+
+
 def test_supports_and_outputs_of_a_symmetric_design_get_their_images(page: Any) -> None:
     page.get_by_role("button", name="Empty rectangle").click()
     until(page, lambda: summary(page, "supports") == "none")

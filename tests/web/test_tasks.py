@@ -71,6 +71,8 @@ def test_every_listed_task_is_built_with_its_items(client: TestClient) -> None:
             continue
         assert task is not None
         assert problem_from_dict(built["problem"]).hash == task.problem.hash
+        assert [each["case"] for each in built["conditions"]] == list(task.problem.cases)
+        assert all(each["texts"][0].startswith("input ") for each in built["conditions"])
         wanted = task.problem.specification
         assert wanted is not None
         named = [each["name"] for each in built["items"]]

@@ -191,7 +191,7 @@ export interface Named { name: string; title: string }
 /** Registered entries of the server, from which the page builds its choices. */
 export interface Registries {
   searches: (Named & { summary: string; running_best: boolean })[];
-  materials: Named[];
+  materials: (Named & { /** Largest strain; null if it is not known. */ strain_limit: number | null })[];
   files: (Named & { purpose: string; in_space: boolean })[];
   /** Usual deviations over which a task is designed. */
   tolerance: Named[];
