@@ -189,6 +189,7 @@ export class Result {
     const found = this.known.shares[name];
     if (found === undefined) return " …";
     if (found === null || found.share === null) return ", waiting for other checks of parts …";
+    if (found.share === 0 && name !== "tolerance") return `, ${duration(found.seconds)} so far for the mesh and the first state …`;
     const left = found.left === null ? "" : `, about ${duration(found.left)} left`;
     return `, ${Math.round(100 * found.share)} % in ${duration(found.seconds)}${left} …`;
   }

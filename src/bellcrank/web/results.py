@@ -22,8 +22,6 @@ MOST_RESULTS = 64
 """Number of results in memory, up to two megabytes each."""
 MOST_FILES = 256
 """Number of results in files."""
-LEAST_SHARE = 0.02
-"""Share that is done from which on the time left is estimated."""
 
 
 class Results:
@@ -127,7 +125,7 @@ class StoredResults:
 
         None if it was not begun, or if it does not run and only that is asked for. The share is
         None if it is not known; ``seconds`` are those since the computation began, ``left`` those
-        that it still takes if it goes on as fast as so far, None if that is not known.
+        that it still takes by the estimate of `ShareFile`, None if that is not known or has passed.
         """
         if self._results.is_running(key):
             return _progress(self._path(key, "share"))
@@ -177,13 +175,12 @@ class StoredResults:
 def _progress(path: Path) -> dict[str, float | None]:
     """Return the fraction that a computation has written, the seconds so far, and those left."""
     try:
-        share, seconds = (float(each) for each in path.read_text(encoding="ascii").split())
+        share, seconds, left = map(float, path.read_text(encoding="ascii").split())
         since = max(time.time() - path.stat().st_mtime, 0.0)
     except (OSError, ValueError):
         return {"share": None, "seconds": None, "left": None}
-    left = seconds * (1.0 - share) / share - since if share >= LEAST_SHARE else -1.0
     return {
         "share": share,
         "seconds": round(seconds + since),
-        "left": round(left) if left > 0.0 else None,
+        "left": round(left - since) if left > since else None,
     }

@@ -135,9 +135,11 @@ def _export(design: Design, spec: PartSpec, path: Path, grips: Grips) -> None:
 
 
 class ShareFile:
-    """A file with the fraction of a computation that is done and the seconds that it took.
+    """A file with the fraction of a computation that is done, its seconds so far, and those left.
 
-    It is for another process, and written when the computation begins.
+    It is for another process, and written when the computation begins. The time left follows from
+    that between the first fraction above 0 and the present one, since what comes before, such as
+    a mesh, may take longer than the rest; it is nan until then.
 
     Parameters
     ----------
@@ -149,15 +151,23 @@ class ShareFile:
         self._path = path
         self._written = -LEAST_SHARE
         self._began = time.monotonic()
+        self._first: tuple[float, float] | None = None
         self(0.0)
 
     def __call__(self, share: float) -> None:
         """Write the fraction, unless it has hardly changed."""
         if self._path and share - self._written >= LEAST_SHARE:
             self._written = share
-            seconds = time.monotonic() - self._began
+            seconds, left = time.monotonic() - self._began, math.nan
+            if self._first is not None:
+                done, before = self._first
+                left = (1.0 - share) * (seconds - before) / (share - done)
+            elif share > 0.0:
+                self._first = share, seconds
             with contextlib.suppress(OSError):
-                Path(self._path).write_text(f"{share:.3f} {seconds:.1f}", encoding="ascii")
+                Path(self._path).write_text(
+                    f"{share:.3f} {seconds:.1f} {left:.1f}", encoding="ascii"
+                )
 
 
 def part_summary(
