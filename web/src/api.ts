@@ -70,6 +70,8 @@ export interface PartFigures {
   travel_mm?: number | null;
   off_axis?: number | null;
   rotation_deg?: number | null;
+  /** Axis of the largest rotation, about which it is right-handed. */
+  rotation_axis?: [number, number, number] | null;
   output_deformation_mm?: number | null;
   payload_N?: number | null;
   dead_load_N?: number | null;
@@ -118,6 +120,8 @@ export interface Motion {
   snapped: boolean[];
   /** Rotation of the first output that has several nodes, in degrees; in space its size. */
   rotation: (number | null)[];
+  /** Axis of this rotation in space, about which it is right-handed; null for a small one. */
+  axis: ([number, number, number] | null)[];
   /** The model in words. */
   model: string;
 }
