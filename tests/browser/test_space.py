@@ -9,6 +9,7 @@ import pytest
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe")
 
+from bellcrank.machines.bundled import bundled_part  # noqa: E402
 from bellcrank.model import problem_to_dict  # noqa: E402
 from bellcrank.task import find_task  # noqa: E402
 
@@ -126,6 +127,32 @@ def test_an_output_turns_about_the_middle_node_of_an_input(page: Any, server: Se
     readout = page.locator(".player .readout")
     readout.get_by_text("rotation of the output").wait_for()
     assert readout.locator("strong").inner_text().endswith("°")
+
+
+@pytest.mark.parametrize("width", [1440, 320])
+def test_a_result_that_turns_has_its_axis_and_curves(page: Any, server: Server, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 900})
+    design = bundled_part("machine:twist-column")
+    assert design is not None
+    data = {
+        "problem": problem_to_dict(design.problem), "mask": design.mask_hex, "title": "column",
+        "provenance": dict(design.provenance),
+    }  # fmt: skip
+    kept = page.request.post(f"{server.address}/api/gallery", data=data).json()
+    page.goto(f"{server.address}/#/design/{kept['source']}/{kept['key']}")
+    row = page.locator(".figures.part tr", has_text="rotation of the output")
+    row.get_by_text("about (0, 0, −1), clockwise seen from above").wait_for()
+    charts = page.locator(".stroke-charts").get_by_role("img")
+    turn, force = (chart.get_attribute("aria-label") for chart in charts.all())
+    assert re.fullmatch(r"rotation of the output over .*, 57\.\d ° at 3\.00 mm", turn or "")
+    assert re.fullmatch(r"input force over .* N at 3\.00 mm", force or "")
+    box = charts.first.bounding_box()
+    assert box is not None
+    assert 220 <= box["width"] <= width
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert findings(page) == []
+    page.locator(".stroke-charts summary").click()
+    until(page, lambda: not charts.first.is_visible())
 
 
 def test_a_design_in_space_is_drawn_by_hand(page: Any) -> None:

@@ -79,6 +79,8 @@ export interface PartFigures {
   largest_input_force_N?: number | null;
   strain?: number | null;
   path_mm?: Point[];
+  /** Values from rest to the full stroke. */
+  curve?: Record<"input_mm" | "output_mm" | "rotation_deg" | "input_force_N", (number | null)[]>;
 }
 
 export interface PartReport {

@@ -1,12 +1,13 @@
 // The panel beside a design: its specification, figures, part, files and next steps.
 
-import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, maximisesRotation, post, session, type Collection, type Comparison, type ItemState, type Part, type PartFigures, type PartReport, type Point, type Problem, type Registries, ServerError, type ToleranceFound } from "./api";
+import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, isTurning, maximisesRotation, post, session, type Collection, type Comparison, type ItemState, type Part, type PartFigures, type PartReport, type Point, type Problem, type Registries, ServerError, type ToleranceFound } from "./api";
 import { compareAddress } from "./address";
 import { openTask } from "./begin";
 import { button, clear, count, download, duration, field, figure, h, number, select } from "./dom";
 import { where } from "./drawing";
 import { Player, type Picture } from "./player";
 import { figureTables, FRAMES, itemTable, otherObjective, verdictOf, type Column } from "./specification";
+import { strokeCharts } from "./strokechart";
 import type { Table } from "./task";
 import { fileName, REMEDIES, sentence } from "./text";
 
@@ -78,6 +79,8 @@ export class Result {
   private readonly filesBox = h("div", { class: "content" });
   private part: Part;
   private report: PartReport | string | null = null;
+  /** Curves of this report, which stay open or closed when it is shown again. */
+  private charts: HTMLElement | null = null;
   private reports = 0;
   private registries: Registries | null = null;
   private remarks: Remarks | null = null;
@@ -207,7 +210,7 @@ export class Result {
 
   private async loadReport(): Promise<void> {
     const asked = ++this.reports;
-    this.report = null;
+    this.report = this.charts = null;
     this.showTable();
     const { problem, mask } = this.subject;
     let found: PartReport | string;
@@ -263,7 +266,8 @@ export class Result {
     const models: [string, PartFigures[]][] = [["frames", report.figures]];
     if (solid?.figures) models.push([title, solid.figures]);
     const conditions = columns.length > 0 && h("p", { class: "note" }, `Items with ${report.conditions.join("; ")}.`);
-    clear(this.reportBox, columns.length > 0 && itemTable(columns), conditions, ...figureTables(models));
+    this.charts ??= strokeCharts(report.figures, (name) => isTurning(this.subject.problem, name));
+    clear(this.reportBox, columns.length > 0 && itemTable(columns), conditions, ...figureTables(models), this.charts);
     const better = this.subject.comparison?.efficiency ?? null;
     const defect = unstable ? "The part has no stable path to the full stroke."
       : last && !isMet ? "The specification is not met."

@@ -63,7 +63,8 @@ def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> li
         Plain data with units in the keys; None where a figure does not exist. ``path_mm`` are the
         displacements of the output at equal fractions of the stroke. ``rotation_deg`` is the size
         of the largest rotation along the stroke, ``rotation_axis`` its axis in space, about which
-        it is right-handed.
+        it is right-handed. ``curve`` has the motion of the input, that of the output along its
+        direction, its rotation and the input force from rest to the full stroke.
 
     Examples
     --------
@@ -158,7 +159,18 @@ def _along(record: StrokeRecord, output: str, units: ProblemUnits) -> dict[str, 
             units.in_part("stiffness", record.of("stiffness", output)[0])
         ),
         "sag_mm": finite(units.in_part("length", sag)),
+        "curve": {
+            "input_mm": _from_rest(units.in_part("length", 1.0) * moved),
+            "output_mm": _from_rest(units.in_part("length", 1.0) * travel),
+            "rotation_deg": _from_rest(record.of("rotation", output)),
+            "input_force_N": _from_rest(units.in_part("force", 1.0) * force),
+        },
     }
+
+
+def _from_rest(values: Values) -> list[float | None]:
+    """Return values along the stroke after 0 at rest."""
+    return [finite(float(f"{value:.5g}")) for value in (0.0, *values.tolist())]
 
 
 def _axis(vectors: Values | None) -> list[float] | None:
