@@ -5,6 +5,7 @@ import { bundledTask, emptySpaceTask, emptyTask, exampleTask } from "./begin";
 import { button, choice, clear, count, field, h, number, select } from "./dom";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
+import { taskPictures } from "./taskpictures";
 import { cleaned, isSpatial, resized, scaled, type Amount, type Domain, type Material, type OutputTable, type Shape, type Table, type Task, type ZoneKind, type ZoneShape } from "./task";
 import { lengthIn } from "./text";
 
@@ -65,7 +66,7 @@ export class DomainPanel {
       ...[...new Set(this.tasks.map(({ kind }) => kind))].map((kind) => h("optgroup", { label: `Tasks ${kind}`.replace("Tasks parts", "Parts") },
         ...this.tasks.filter((each) => each.kind === kind).map(({ name, about: text }) => h("option", { value: name }, kind.startsWith("parts") || !text ? name : `${name}: ${short(text)}`)))));
     clear(this.start, button("Empty rectangle", () => open("empty")), button("Empty box in space", () => open("empty-space")),
-      h("label", { for: "start" }, "or start from"), pick, this.about);
+      h("label", { for: "start" }, "or start from"), pick, this.about, this.tasks.length > 0 && taskPictures(open));
   }
 
   /** How much of the domain the lattice fills, if that is not all of it. */
