@@ -98,6 +98,28 @@ def test_a_task_in_space_is_stated_by_layers_nodes_and_keys(page: Any) -> None:
     assert task(page)["table"]["domain"]["size"] == [45, 17, 45]
 
 
+def test_an_empty_box_gets_a_lattice_that_is_symmetric_by_thirds_of_a_turn(page: Any) -> None:
+    page.get_by_role("button", name="Empty box in space").click()
+    page.locator(".space canvas").wait_for()
+    section(page, "domain")
+    page.locator('[data-key="domain-depth"]').fill("45")
+    page.keyboard.press("Tab")
+    until(page, lambda: task(page)["table"]["domain"]["size"] == [45, 45, 45])
+    page.locator('[data-key="domain-cells"]').select_option("on-corner")
+    until(page, lambda: "110 nodes" in summary(page, "domain"))
+    page.get_by_text("designs may be 3-fold symmetric").wait_for()
+    chosen = task(page)["table"]["domain"]["cells"]
+    section(page, "limits")
+    page.get_by_label("Symmetry of the design").select_option("3-fold")
+    page.get_by_text("It needs the lattice “octet on a corner").wait_for()
+    # It is that of the bundled task, whose design is searched with this symmetry.
+    begin(page, "twist-column")
+    until(page, lambda: task(page)["table"]["name"] == "twist-column")
+    assert task(page)["table"]["domain"]["cells"] == chosen
+    assert page.locator('[data-key="domain-cells"]').input_value() == "on-corner"
+    until(page, lambda: page.get_by_role("button", name="Design it").is_enabled())
+
+
 def test_an_output_turns_about_the_middle_node_of_an_input(page: Any, server: Server) -> None:
     begin(page, "twist-column")
     until(

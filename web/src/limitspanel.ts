@@ -9,6 +9,14 @@ const SYMMETRIES: [string, string][] = [["", "none"], ["x", "left and right"], [
 const SYMMETRIES_IN_SPACE: [string, string][] = [
   ["", "none"], ["x", "left and right"], ["y", "front and back"], ["xy", "both"], ["3-fold", "3-fold"], ["4-fold", "4-fold"]];
 
+/** The lattice in space that a third of a turn does not change. */
+export const ON_CORNER_TITLE = "octet on a corner, in a cylinder: 3-fold";
+/** What a symmetry needs of the domain. */
+const NEEDS: Record<string, string> = {
+  "3-fold": `A third of a turn. It needs the lattice “${ON_CORNER_TITLE}” with equal width and depth (Part, domain).`,
+  "4-fold": "A quarter of a turn. It needs equal width and depth.",
+};
+
 export function limitsPanel(editor: TaskEditor): HTMLElement {
   const { table } = editor.task;
   const limits = table.limits ?? {};
@@ -31,7 +39,7 @@ export function limitsPanel(editor: TaskEditor): HTMLElement {
       amount("limit-clearance", "Gap between struts at least", value("clearance"), "mm", (given) => put({ clearance: given }), "empty: they must not touch")),
     h("div", { class: "row" }, field("mass", "Mass at most", "g", "empty: not limited"), field("stable_stroke", "Stable up to", "", "such as 120%; empty: up to the full stroke")),
     h("div", { class: "row" }, field("strut_loss", "Loss of a strut costs at most", "", "such as 30%; empty: not limited"),
-      h("div", { class: "field" }, h("label", { for: "limit-symmetry" }, "Symmetry of the design"), symmetry)),
+      h("div", { class: "field" }, h("label", { for: "limit-symmetry" }, "Symmetry of the design"), symmetry, isSpatial(table) && NEEDS[limits.symmetry ?? ""] && h("small", {}, NEEDS[limits.symmetry ?? ""]))),
     h("label", { class: "tick" }, over, "Design over tolerances of print and drive"),
     table.tolerance !== undefined && toleranceFields(editor, table.tolerance));
 }
