@@ -11,6 +11,10 @@ import { Result } from "./result";
 import { itemTable, otherObjective, verdictOf } from "./specification";
 import { runMessage, REMEDIES, sentence, statusName } from "./text";
 
+/** Titles of the button that ends a refinement or a search. */
+const TAKE = "Stop and take the result";
+const CHOOSE = "Stop and choose the best";
+
 export class RunPage {
   readonly element = h("div", { class: "page run" });
   private drawing: LatticeDrawing | null = null;
@@ -220,7 +224,7 @@ export class RunPage {
     bar.value = share;
     clear(this.live.querySelector("dl")!, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
     const reached = this.update?.moved?.items;
-    clear(this.items, !this.result && reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by the ${this.update!.moved!.problem ? "best refined design so far" : "best design so far, before refinement"}${reached.every(({ met }) => met) && run.status === "running" ? "; “Stop and choose the best” is possible" : ""}.`),
+    clear(this.items, !this.result && reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by the ${this.update!.moved!.problem ? "best refined design so far" : "best design so far, before refinement"}${reached.every(({ met }) => met) && run.status === "running" ? `; “${run.refine ? TAKE : CHOOSE}” is possible` : ""}.`),
       !this.result && reached && itemTable([{ title: "frames", items: reached }]));
     if (run.message && run.status !== "running") this.showMessage(run);
     if (!this.result) {
@@ -307,7 +311,7 @@ export class RunPage {
     const refines = Boolean(run.problem.specification) && !run.refine;
     clear(this.controls,
       (status === "running" || status === "queued") && button("Pause", () => void act("pause", "Pausing …")()),
-      status === "running" && button(run.refine ? "Stop and take the result" : "Stop and choose the best", () => void act("stop", run.refine ? "Stopping the refinement …" : "Choosing and verifying the best design …")(), "strong"),
+      status === "running" && button(run.refine ? TAKE : CHOOSE, () => void act("stop", run.refine ? "Stopping the refinement …" : "Choosing and verifying the best design …")(), "strong"),
       status === "running" && !run.refine && button("Open the best so far", () => void keep(), "", { title: "Store it in the gallery, and open it in another tab; the search goes on" }),
       (status === "paused" || (status === "stopped" && !run.refine) || status === "failed") && button(status === "failed" ? "Retry" : "Continue", () => void act("resume")(), "strong"),
       status === "paused" && !run.refine && button("Choose the best", () => void act("stop")()),
