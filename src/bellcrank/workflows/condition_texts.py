@@ -44,8 +44,10 @@ def condition_texts(problem: Problem, part: PartSpec) -> list[str]:
     --------
     >>> from bellcrank.task import find_task
     >>> task = find_task("selector")
-    >>> condition_texts(task.problem, task.part)
-    ['A: input 3 mm right at (40, 62.1) mm', 'B: input 3 mm left at (40, 62.1) mm']
+    >>> for text in condition_texts(task.problem, task.part):
+    ...     print(text)
+    A: input 3 mm right on 3 nodes between (1, 36.3) and (6, 53.7) mm
+    B: input 3 mm left on 3 nodes between (96, 36.3) and (101, 53.7) mm
     """
     several = len(problem.cases) > 1
     found = [
