@@ -9,6 +9,7 @@ import pytest
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe")
 
+from bellcrank.machines.bundled import bundled_part  # noqa: E402
 from bellcrank.model import problem_to_dict  # noqa: E402
 from bellcrank.task import find_task  # noqa: E402
 
@@ -97,6 +98,28 @@ def test_a_task_in_space_is_stated_by_layers_nodes_and_keys(page: Any) -> None:
     assert task(page)["table"]["domain"]["size"] == [45, 17, 45]
 
 
+def test_an_empty_box_gets_a_lattice_that_is_symmetric_by_thirds_of_a_turn(page: Any) -> None:
+    page.get_by_role("button", name="Empty box in space").click()
+    page.locator(".space canvas").wait_for()
+    section(page, "domain")
+    page.locator('[data-key="domain-depth"]').fill("45")
+    page.keyboard.press("Tab")
+    until(page, lambda: task(page)["table"]["domain"]["size"] == [45, 45, 45])
+    page.locator('[data-key="domain-cells"]').select_option("on-corner")
+    until(page, lambda: "110 nodes" in summary(page, "domain"))
+    page.get_by_text("designs may be 3-fold symmetric").wait_for()
+    chosen = task(page)["table"]["domain"]["cells"]
+    section(page, "limits")
+    page.get_by_label("Symmetry of the design").select_option("3-fold")
+    page.get_by_text("It needs the lattice “octet on a corner").wait_for()
+    # It is that of the bundled task, whose design is searched with this symmetry.
+    begin(page, "twist-column")
+    until(page, lambda: task(page)["table"]["name"] == "twist-column")
+    assert task(page)["table"]["domain"]["cells"] == chosen
+    assert page.locator('[data-key="domain-cells"]').input_value() == "on-corner"
+    until(page, lambda: page.get_by_role("button", name="Design it").is_enabled())
+
+
 def test_an_output_turns_about_the_middle_node_of_an_input(page: Any, server: Server) -> None:
     begin(page, "twist-column")
     until(
@@ -126,6 +149,32 @@ def test_an_output_turns_about_the_middle_node_of_an_input(page: Any, server: Se
     readout = page.locator(".player .readout")
     readout.get_by_text("rotation of the output").wait_for()
     assert readout.locator("strong").inner_text().endswith("°")
+
+
+@pytest.mark.parametrize("width", [1440, 320])
+def test_a_result_that_turns_has_its_axis_and_curves(page: Any, server: Server, width: int) -> None:
+    page.set_viewport_size({"width": width, "height": 900})
+    design = bundled_part("machine:twist-column")
+    assert design is not None
+    data = {
+        "problem": problem_to_dict(design.problem), "mask": design.mask_hex, "title": "column",
+        "provenance": dict(design.provenance),
+    }  # fmt: skip
+    kept = page.request.post(f"{server.address}/api/gallery", data=data).json()
+    page.goto(f"{server.address}/#/design/{kept['source']}/{kept['key']}")
+    row = page.locator(".figures.part tr", has_text="rotation of the output")
+    row.get_by_text("about (0, 0, −1), clockwise seen from above").wait_for()
+    charts = page.locator(".stroke-charts").get_by_role("img")
+    turn, force = (chart.get_attribute("aria-label") for chart in charts.all())
+    assert re.fullmatch(r"rotation of the output over .*, 57\.\d ° at 3\.00 mm", turn or "")
+    assert re.fullmatch(r"input force over .* N at 3\.00 mm", force or "")
+    box = charts.first.bounding_box()
+    assert box is not None
+    assert 220 <= box["width"] <= width
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert findings(page) == []
+    page.locator(".stroke-charts summary").click()
+    until(page, lambda: not charts.first.is_visible())
 
 
 def test_a_design_in_space_is_drawn_by_hand(page: Any) -> None:

@@ -29,6 +29,36 @@ def test_an_output_that_turns_needs_no_direction(page: Any) -> None:
     )
 
 
+def test_the_list_of_what_is_asked_has_inputs_loads_and_limits_that_hold(page: Any) -> None:
+    page.get_by_label("or start from").select_option("selector")
+    asked = page.get_by_role("list", name="Inputs and loads")
+    until(page, lambda: asked.locator("li").count() == 2)
+    first, second = asked.locator("li").all_inner_texts()
+    assert first.startswith("A: Input 3 mm right on 3 nodes between (")
+    assert second.startswith("B: Input 3 mm left ")
+    section(page, "limits")
+    page.get_by_text("empty: 65 %, that of NinjaFlex").wait_for()
+    section(page, "domain")
+    page.get_by_label("Material").select_option("tpu-95a")
+    page.get_by_text("empty: not limited, no limit of TPU 95A is known").wait_for()
+
+
+def test_a_task_is_opened_by_its_picture(page: Any) -> None:
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.reload()
+    page.locator("svg.canvas").wait_for()
+    pictures = page.get_by_text("Pictures of the tasks")
+    pictures.wait_for()
+    assert not [url for url in asked if url.endswith("/pictures")]  # before they are opened
+    pictures.click()
+    tile = page.get_by_role("button", name="twist A hub in the middle")
+    tile.locator(".task-arrow.input").wait_for()
+    tile.click()
+    until(page, lambda: task(page)["table"]["name"] == "twist")
+    assert not tile.is_visible()
+
+
 def test_supports_and_outputs_of_a_symmetric_design_get_their_images(page: Any) -> None:
     page.get_by_role("button", name="Empty rectangle").click()
     until(page, lambda: summary(page, "supports") == "none")

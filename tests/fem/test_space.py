@@ -135,6 +135,12 @@ def test_items_of_a_part_in_space_are_computed_in_the_solid() -> None:
         else:
             rough = 0.25 if one.item.quantity == "strain" else 0.12
             assert other.value == pytest.approx(one.value, rel=rough), one.item.quantity
+    # The rotation of the output has an axis in both models.
+    one, other = (
+        validation.figures[model][0]["rotation_axis"] for model in list(validation.items)[-2:]
+    )
+    assert np.linalg.norm(one) == pytest.approx(1.0, abs=2e-3)
+    assert np.dot(one, other) > 0.95
 
 
 def test_a_frame_in_space_has_the_figures_of_the_solid() -> None:

@@ -315,6 +315,10 @@ def test_the_page_is_served_every_registered_search_material_and_level(client: T
     assert served["searches"][0]["name"] == DEFAULT_SEARCH
     assert all(each["summary"] for each in served["searches"])
     assert all(each["duration"] for each in served["levels"])
+    # The page shows the limit that holds where a task has none.
+    limits = {each["name"]: each["strain_limit"] for each in served["materials"]}
+    assert limits["ninjaflex"] == materials["ninjaflex"].strain_limit
+    assert limits["tpu-95a"] is None
 
 
 @pytest.mark.parametrize(

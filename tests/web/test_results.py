@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import time
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from bellcrank.web import slow_calls
 from bellcrank.web.pools import Stopped
 from bellcrank.web.results import Results, StoredResults
 from bellcrank.web.slow_calls import ShareFile
@@ -110,28 +114,59 @@ def test_a_stored_result_outlasts_the_server(tmp_path: Path) -> None:
     asyncio.run(run())
 
 
+def test_the_time_left_follows_from_what_is_done_after_the_first_share(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A mesh of 200 s comes first; each tenth then takes 10 s."""
+    clock = iter([0.0, 0.0, 200.0, 210.0, 240.0])
+    monkeypatch.setattr(slow_calls, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    path, found = tmp_path / "solid.share", []
+    write = ShareFile(str(path))
+    for share in (0.1, 0.2, 0.205, 0.5):
+        write(share)
+        found.append(path.read_text())
+    assert found == [
+        "0.100 200.0 nan", "0.200 210.0 80.0", "0.200 210.0 80.0", "0.500 240.0 50.0"
+    ]  # fmt: skip
+
+
 def test_the_share_of_a_computation_is_0_when_it_begins(tmp_path: Path) -> None:
     """Without a share, it waits for others."""
     path = tmp_path / "crane.share"
     write = ShareFile(str(path))
-    assert float(path.read_text()) == 0.0
+    assert float(path.read_text().split()[0]) == 0.0
     write(0.5)
-    assert float(path.read_text()) == 0.5
+    assert float(path.read_text().split()[0]) == 0.5
 
 
-def test_a_running_computation_has_the_share_that_it_writes(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("written", "left"),
+    [("0.250 60.0 180.0", 170), ("0.900 60.0 6.0", None), ("0.000 0.1 nan", None)],
+)
+def test_a_running_computation_has_the_share_and_times(
+    tmp_path: Path, written: str, left: int | None
+) -> None:
+    """Of the time left, 10 s have passed; it is not known at first, nor when it has passed."""
+
     async def run() -> None:
         results, go_on = StoredResults(tmp_path / "results"), asyncio.Event()
 
         async def compute(share: Path) -> dict[str, Any]:
-            share.write_text("0.250")
+            share.write_text(written)
+            before = time.time() - 10.0
+            os.utime(share, (before, before))
             await go_on.wait()
             return {"stress": 0.5}
 
         task = asyncio.create_task(results.get("crane", compute))
         for _ in range(3):
             await asyncio.sleep(0)
-        assert results.state("crane") == {"share": 0.25}
+        share, seconds, _ = map(float, written.split())
+        found = results.state("crane")
+        assert found is not None
+        assert found["share"] == share
+        assert found["seconds"] == pytest.approx(seconds + 10.0, abs=1.0)
+        assert found["left"] == (None if left is None else pytest.approx(left, abs=1))
         go_on.set()
         await task
         assert results.state("crane") == {"result": {"stress": 0.5}}

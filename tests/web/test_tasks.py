@@ -59,6 +59,22 @@ def full_mask(problem: dict[str, Any]) -> str:
     return np.packbits(np.ones(len(problem["beams"]), dtype=bool)).tobytes().hex()
 
 
+def test_every_bundled_task_has_a_picture_with_its_arrows(client: TestClient) -> None:
+    found = {each["name"]: each for each in client.get("/api/tasks/pictures").json()}
+    listed = {each["name"]: each["about"] for each in client.get("/api/tasks").json()}
+    assert set(found) == {name for name in listed if not name.startswith("element-")}
+    for name, each in found.items():
+        assert each["about"] == listed[name]
+        picture = each["picture"]
+        assert all(len(picture[mark]) >= 2 for mark in ("lines", "supports", "input", "output"))
+        assert each["arrows"]["input"], name
+    # Both sides of a disc are pushed; its hub turns, in no direction.
+    assert sorted(arrow[2] for arrow in found["twist"]["arrows"]["input"]) == [-1.0, 1.0]
+    assert found["twist"]["arrows"]["output"] == []
+    (_, _, across, up), *_ = found["gripper"]["arrows"]["input"]
+    assert (across, up) == (0.0, -1.0)
+
+
 def test_every_listed_task_is_built_with_its_items(client: TestClient) -> None:
     listed = {each["name"] for each in client.get("/api/tasks").json()}
     assert {"straight-crane", "gripper", "selector", "bracket", "twist-column"} <= listed
@@ -71,6 +87,8 @@ def test_every_listed_task_is_built_with_its_items(client: TestClient) -> None:
             continue
         assert task is not None
         assert problem_from_dict(built["problem"]).hash == task.problem.hash
+        assert [each["case"] for each in built["conditions"]] == list(task.problem.cases)
+        assert all(each["texts"][0].startswith("input ") for each in built["conditions"])
         wanted = task.problem.specification
         assert wanted is not None
         named = [each["name"] for each in built["items"]]

@@ -42,9 +42,9 @@ def test_every_load_of_a_task_is_listed() -> None:
         }
     )  # fmt: skip
     assert condition_texts(task.problem, task.part) == [
-        "input 3 mm up",
-        "load of 0.05 N in all at 30 deg on 2 nodes, grows with the input",
-        "spring of 0.1 N/mm at 1 node, right",
+        "input 3 mm up at (61, 1.4) mm",
+        "load of 0.05 N in all at 30 deg at (81, 70.6) and (91, 70.6) mm, grows with the input",
+        "spring of 0.1 N/mm at (91, 1.4) mm, right",
         "own weight down, grows with the input",
         "spring of 0.2 N/mm against output",
     ]
@@ -74,7 +74,61 @@ def test_a_direction_in_space_without_a_name_has_components() -> None:
         }
     )
     (text,) = condition_texts(task.problem, task.part)
-    assert text == "input 2 mm along (0.00, 0.60, 0.80)"
+    assert text == "input 2 mm along (0.00, 0.60, 0.80) at (6.9, 6.9, 35.1) mm"
+
+
+def test_inputs_of_several_directions_and_parts_of_the_stroke_are_texts_of_their_own() -> None:
+    task = task_from_dict(
+        {
+            "name": "arm",
+            "domain": {"size": ["92 mm", "72 mm"]},
+            "supports": [{"at": {"edge": "left"}}],
+            "cases": [
+                {
+                    "inputs": [
+                        {
+                            "at": {"edge": "bottom", "between": [60, 92]}, "direction": "up",
+                            "displacement": "3 mm", "during": ["0%", "50%"],
+                        },
+                        {
+                            "at": {"point": [88, 70]}, "direction": "left",
+                            "displacement": "3 mm", "during": ["50%", "100%"],
+                        },
+                    ],
+                    "outputs": [
+                        {"at": {"point": [46, 40]}, "direction": "up", "gain": "maximise"}
+                    ],
+                }
+            ],
+        }
+    )  # fmt: skip
+    assert condition_texts(task.problem, task.part) == [
+        "input 3 mm up on 4 nodes between (61, 1.4) and (91, 1.4) mm, from 0% to 50% of the stroke",
+        "input 3 mm left at (91, 70.6) mm, from 50% to 100% of the stroke",
+    ]
+
+
+def test_a_force_is_that_on_all_nodes_of_an_input() -> None:
+    task = task_from_dict(
+        {
+            "name": "arm",
+            "domain": {"size": ["92 mm", "72 mm"]},
+            "supports": [{"at": {"edge": "left"}}],
+            "cases": [
+                {
+                    "inputs": [
+                        {"at": {"edge": "bottom", "between": [60, 92]}, "direction": "up",
+                         "force": "0.5 N"}
+                    ],
+                    "outputs": [
+                        {"at": {"point": [46, 40]}, "direction": "up", "gain": "maximise"}
+                    ],
+                }
+            ],
+        }
+    )  # fmt: skip
+    (text,) = condition_texts(task.problem, task.part)
+    assert text.startswith("input of 0.5 N up on 4 nodes between ")
 
 
 def test_a_material_without_a_known_limit_of_the_strain_is_remarked() -> None:

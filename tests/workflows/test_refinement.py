@@ -17,6 +17,7 @@ from bellcrank.refine.refinement import Progress
 from bellcrank.refine.state import State
 from bellcrank.search.selection import Candidate, Finalist, Selection
 from bellcrank.task import find_task
+from bellcrank.web import refinement_progress
 from bellcrank.web.refinement_progress import RefinementReporter
 from bellcrank.workflows import refinement
 from bellcrank.workflows.refinement import BATCHES, refine_selection, with_refined
@@ -181,3 +182,20 @@ def test_the_geometry_that_is_shown_is_the_nearest_until_one_meets_all_items() -
     # The first one is not shown beside a design that meets all items.
     assert shown == [None, 2.0, 2.0, 1.0, 1.0, 2.0]
     assert [each.efficiency for each in reporter.designs()] == [2.0, 1.0]
+
+
+def test_the_time_of_a_geometry_is_known_from_the_second_one_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = iter([100.0, 101.0, 130.0])
+    monkeypatch.setattr(refinement_progress, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    reporter = RefinementReporter(PartSpec(), GeometryCount(most=40))
+    rows: Any = SimpleNamespace(violation=1.0, objective=0.0)
+    found = []
+    for evaluations in (1, 16):
+        progress: Any = SimpleNamespace(rows=rows, design=None, evaluations=evaluations, sheets=0)
+        reporter.add(0, progress)
+        summary = reporter.summary()
+        assert summary is not None
+        found.append((summary["geometries"], summary["most"], summary["seconds"]))
+    assert found == [(1, 40, None), (16, 40, 2.0)]

@@ -70,6 +70,8 @@ export interface PartFigures {
   travel_mm?: number | null;
   off_axis?: number | null;
   rotation_deg?: number | null;
+  /** Axis of the largest rotation, about which it is right-handed. */
+  rotation_axis?: [number, number, number] | null;
   output_deformation_mm?: number | null;
   payload_N?: number | null;
   dead_load_N?: number | null;
@@ -77,6 +79,8 @@ export interface PartFigures {
   largest_input_force_N?: number | null;
   strain?: number | null;
   path_mm?: Point[];
+  /** Values from rest to the full stroke. */
+  curve?: Record<"input_mm" | "output_mm" | "rotation_deg" | "input_force_N", (number | null)[]>;
 }
 
 export interface PartReport {
@@ -118,6 +122,8 @@ export interface Motion {
   snapped: boolean[];
   /** Rotation of the first output that has several nodes, in degrees; in space its size. */
   rotation: (number | null)[];
+  /** Axis of this rotation in space, about which it is right-handed; null for a small one. */
+  axis: ([number, number, number] | null)[];
   /** The model in words. */
   model: string;
 }
@@ -164,7 +170,7 @@ export interface RunUpdate {
   speed: number | null;
   left: number | null;
   tried: [number, number] | null;
-  refined: { designs: number; geometries: number; sheets: number; /** Largest number of geometries. */ most: number; objective: number | null } | null;
+  refined: { designs: number; geometries: number; sheets: number; /** Largest number of geometries. */ most: number; /** Mean time of a geometry. */ seconds: number | null; objective: number | null } | null;
   /** The displayed design, with the nodes of its problem if it is refined; null for the one sent before. */
   moved: { mask: string; problem: Problem | null; efficiency: number | null; displacement: number[] | null; items: ItemState[] | null; objectives: Objective[] } | null;
   error?: { message: string };
@@ -191,7 +197,7 @@ export interface Named { name: string; title: string }
 /** Registered entries of the server, from which the page builds its choices. */
 export interface Registries {
   searches: (Named & { summary: string; running_best: boolean })[];
-  materials: Named[];
+  materials: (Named & { /** Largest strain; null if it is not known. */ strain_limit: number | null })[];
   files: (Named & { purpose: string; in_space: boolean })[];
   /** Usual deviations over which a task is designed. */
   tolerance: Named[];

@@ -143,7 +143,8 @@ export class Chart {
   }
 }
 
-function ladder(low: number, high: number): number[] {
+/** Round values for an axis, from one below a range to one above it. */
+export function ladder(low: number, high: number): number[] {
   const raw = (high - low) / 4 || 1;
   const power = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= raw) ?? power;

@@ -4,7 +4,7 @@ import type { Collection, GalleryEntry } from "./api";
 import { thicken } from "./drawing";
 import { button, count, field, figure, h, s, select } from "./dom";
 
-export function thumbnail({ picture }: GalleryEntry): SVGElement {
+export function thumbnail({ picture }: Pick<GalleryEntry, "picture">): SVGElement {
   const [x0, y0, x1, y1] = picture.box as [number, number, number, number];
   const margin = 0.7;
   let d = "";

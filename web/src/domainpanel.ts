@@ -5,6 +5,8 @@ import { bundledTask, emptySpaceTask, emptyTask, exampleTask } from "./begin";
 import { button, choice, clear, count, field, h, number, select } from "./dom";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
+import { ON_CORNER_TITLE } from "./limitspanel";
+import { taskPictures } from "./taskpictures";
 import { cleaned, isSpatial, resized, scaled, type Amount, type Domain, type Material, type OutputTable, type Shape, type Table, type Task, type ZoneKind, type ZoneShape } from "./task";
 import { lengthIn } from "./text";
 
@@ -12,6 +14,8 @@ import { lengthIn } from "./text";
 const LATTICES = ["crane", "anti-parallel", "pliers", "scaling-8", "scaling-12", "discs"];
 const ZONES: [ZoneKind, string][] = [["holes", "Hole"], ["keep_out", "Free"], ["solid", "Solid"]];
 const FRESH: Record<string, () => Task> = { example: exampleTask, empty: emptyTask, "empty-space": emptySpaceTask };
+/** Octets that stand on a corner: layers of triangles, which a third of a turn does not change. */
+const ON_CORNER = { kind: "octet", up: [1, 1, 1], envelope: "cylinder" };
 const OWN: Material = { name: "own", young: 12, poisson: 0.45, density: 1.2, strain_limit: 0.3 };
 
 export class DomainPanel {
@@ -65,7 +69,7 @@ export class DomainPanel {
       ...[...new Set(this.tasks.map(({ kind }) => kind))].map((kind) => h("optgroup", { label: `Tasks ${kind}`.replace("Tasks parts", "Parts") },
         ...this.tasks.filter((each) => each.kind === kind).map(({ name, about: text }) => h("option", { value: name }, kind.startsWith("parts") || !text ? name : `${name}: ${short(text)}`)))));
     clear(this.start, button("Empty rectangle", () => open("empty")), button("Empty box in space", () => open("empty-space")),
-      h("label", { for: "start" }, "or start from"), pick, this.about);
+      h("label", { for: "start" }, "or start from"), pick, this.about, this.tasks.length > 0 && taskPictures(open));
   }
 
   /** How much of the domain the lattice fills, if that is not all of it. */
@@ -128,7 +132,7 @@ export class DomainPanel {
     const { table } = editor.task;
     const { domain } = table;
     const kind = domain.size?.length === 3 ? "space" : domain.size ? "size" : domain.outline ? "outline" : domain.problem ? "problem" : "lattice";
-    const put = (next: Domain): void => editor.change({ ...table, domain: cleaned(next) });
+    const put = (next: Domain): void => editor.change({ ...editor.task.table, domain: cleaned(next) });
     const zones = isSpatial(table) ? {} : { holes: domain.holes, keep_out: domain.keep_out, solid: domain.solid };
     const drawing = this.file("Outline to read", ".dxf,.svg", (picked) => this.attempt(() => editor.loadOutline(picked)));
     const options: [string, string][] = [["size", "Rectangle"], ["outline", "Outline"], ["space", "Box in space"], ["problem", "Lattice of the paper"], ...(kind === "lattice" ? [["lattice", "Own lattice"] as [string, string]] : [])];
@@ -199,12 +203,14 @@ export class DomainPanel {
   /** The lattice that fills a box. */
   private cells(domain: Domain, put: (next: Domain) => void): HTMLElement {
     const { cells } = domain;
-    const own = typeof cells === "object" ? cells : null;
-    const options = (this.editor.registries?.cells ?? []).map(({ name, title }): [string, string] => [name, title]);
-    const kinds = select([...options, ...(own ? [["own", `${own.kind} of the task`] as [string, string]] : [])], own ? "own" : String(cells ?? "octet"),
-      (picked) => { if (picked !== "own") put({ ...domain, cells: picked === "octet" ? undefined : picked }); });
+    const isOnCorner = typeof cells === "object" && Object.keys(cells).length === 3 && Object.entries(ON_CORNER).every(([key, value]) => JSON.stringify(cells[key]) === JSON.stringify(value));
+    const own = typeof cells === "object" && !isOnCorner ? cells : null;
+    const options = [...(this.editor.registries?.cells ?? []).map(({ name, title }): [string, string] => [name, title]), ["on-corner", ON_CORNER_TITLE] as [string, string]];
+    const kinds = select([...options, ...(own ? [["own", `${own.kind} of the task`] as [string, string]] : [])], own ? "own" : isOnCorner ? "on-corner" : String(cells ?? "octet"),
+      // The size may have been changed after the panel was drawn.
+      (picked) => { if (picked !== "own") put({ ...this.editor.task.table.domain, cells: picked === "octet" ? undefined : picked === "on-corner" ? ON_CORNER : picked }); });
     kinds.dataset.key = "domain-cells";
-    return field("Lattice", kinds);
+    return field("Lattice", kinds, "", isOnCorner ? "A third of a turn about the upright axis does not change this lattice if width and depth are equal: designs may be 3-fold symmetric." : "");
   }
 
   /** A hole or zone in space, by numbers. */

@@ -150,13 +150,16 @@ export class Panels {
   showItems(): void {
     const { editor } = this;
     const items = editor.built?.items ?? [];
+    const conditions = editor.built?.conditions ?? [];
+    const asked = conditions.length > 0 && h("ul", { class: "plain conditions", "aria-label": "Inputs and loads" },
+      ...conditions.map(({ case: name, texts }) => h("li", {}, conditions.length > 1 && h("b", {}, `${name}: `), sentence(texts.join("; ")))));
     const reached = editor.tool === "hand" ? editor.reached : null;
     if (!items.length) {
-      clear(this.items, h("h2", { class: "plain" }, "Specification"), h("p", { class: "note" }, editor.fault ? "It is listed here when the task is without errors." : editor.missing ? "It is listed here when supports, an input and an output are known." : "Nothing but the motion is asked for."));
+      clear(this.items, h("h2", { class: "plain" }, "Specification"), asked, h("p", { class: "note" }, editor.fault ? "It is listed here when the task is without errors." : editor.missing ? "It is listed here when supports, an input and an output are known." : "Nothing but the motion is asked for."));
       return;
     }
     const wanted = items.map((item) => ({ ...item, reached: "", margin: null, met: false }));
-    clear(this.items, h("h2", { class: "plain" }, "Specification"),
+    clear(this.items, h("h2", { class: "plain" }, "Specification"), asked,
       reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by this design.`),
       itemTable(reached ? [{ title: "by hand", items: reached }] : [], wanted),
       !items.some(({ name }) => name.endsWith("strain")) && h("p", { class: "note" }, editor.task.table.limits?.strain === false ? "The strain is not limited." : "The strain is not limited, since no limit of the material is known: enter one under Limits and tolerance."));

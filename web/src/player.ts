@@ -6,6 +6,7 @@ import { binned, BINS, Drawing, markRegions, sectionOf, where, type Group, type 
 import { loadSpace } from "./loadspace";
 import { outputTips } from "./marks";
 import { choice, clear, field, figure, h, icon, s } from "./dom";
+import { turnText } from "./specification";
 import { sentence } from "./text";
 
 export type Colour = "plain" | "energy" | "stress" | "sensitivity" | "loss";
@@ -302,8 +303,10 @@ export class Player {
     const out = efficiency === null || motion.stroke === null ? "" : `${figure(this.part * motion.stroke * this.scale * efficiency, 2)} mm out`;
     const turned = motion.rotation[near];
     const turns = turned != null && isTurning(this.problem, this.loadCase || motion.cases[0]!);
-    const lines = turns ? [`${figure(turned, 1)}°`, `rotation of the output, ${motion.model}`, stroke, "", "", motion.snapped[near] ? "after a snap-through" : ""]
-      : [figure(efficiency, 3), `output / input motion, ${motion.model}`, stroke, out, turned == null ? "" : `output turned by ${figure(turned, 1)}°`, motion.snapped[near] ? "after a snap-through" : ""];
+    const axis = motion.axis[near];
+    const about = axis ? ` ${turnText(axis)}` : "";
+    const lines = turns ? [`${figure(turned, 1)}°`, `rotation of the output${about}, ${motion.model}`, stroke, "", "", motion.snapped[near] ? "after a snap-through" : ""]
+      : [figure(efficiency, 3), `output / input motion, ${motion.model}`, stroke, out, turned == null ? "" : `output turned by ${figure(turned, 1)}°${about}`, motion.snapped[near] ? "after a snap-through" : ""];
     if (this.readout.childElementCount !== 6) {
       clear(this.readout, h("strong"), h("span"), h("span"), h("span"), h("span"), h("span", { class: "alarm" }));
     }

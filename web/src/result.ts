@@ -1,12 +1,13 @@
 // The panel beside a design: its specification, figures, part, files and next steps.
 
-import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, maximisesRotation, post, session, type Collection, type Comparison, type ItemState, type Part, type PartFigures, type PartReport, type Point, type Problem, type Registries, ServerError, type ToleranceFound } from "./api";
+import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, isTurning, maximisesRotation, post, session, type Collection, type Comparison, type ItemState, type Part, type PartFigures, type PartReport, type Point, type Problem, type Registries, ServerError, type ToleranceFound } from "./api";
 import { compareAddress } from "./address";
 import { openTask } from "./begin";
 import { button, clear, count, download, duration, field, figure, h, number, select } from "./dom";
 import { where } from "./drawing";
 import { Player, type Picture } from "./player";
 import { figureTables, FRAMES, itemTable, otherObjective, verdictOf, type Column } from "./specification";
+import { strokeCharts } from "./strokechart";
 import type { Table } from "./task";
 import { fileName, REMEDIES, sentence } from "./text";
 
@@ -41,8 +42,6 @@ const SHARE_PERIOD = 2000;
 
 /** Status of the answer to a computation that was stopped on request. */
 const STOPPED = 409;
-/** Growth of a share from which the time left is estimated. */
-const LEAST_SHARE = 0.05;
 
 /** Part of the random prints that is to meet all items for a green verdict, where the task does not say which. */
 const LEAST_YIELD = 0.9;
@@ -57,9 +56,11 @@ interface Grips { plate: boolean; screws: number; pad: boolean; output_pad: bool
 const gripsOf = new Map<string, Grips>();
 
 /** What was computed of a part. */
-interface Known { fems: Record<string, Fem | "running" | string>; tolerance: ToleranceFound | "running" | string | null; print: Print | "running" | string | null; shares: Record<string, number | null>; /** The first share of each computation that was known, and when, milliseconds. */ began: Record<string, [number, number]> }
-/** What the server knows of a slow computation: its result, or the share that is done. */
-type Computation<Found> = { result: Found } | { share: number | null } | null;
+interface Known { fems: Record<string, Fem | "running" | string>; tolerance: ToleranceFound | "running" | string | null; print: Print | "running" | string | null; shares: Record<string, Share | null> }
+/** The share of a computation that is done, seconds since it began, and those left if they can be estimated. */
+interface Share { share: number | null; seconds: number | null; left: number | null }
+/** What the server knows of a slow computation: its result, or what is done. */
+type Computation<Found> = { result: Found } | Share | null;
 interface Computations { validation: Record<string, Computation<Fem>>; tolerance: Computation<ToleranceFound>; print: Computation<Print> }
 
 export class Result {
@@ -78,6 +79,8 @@ export class Result {
   private readonly filesBox = h("div", { class: "content" });
   private part: Part;
   private report: PartReport | string | null = null;
+  /** Curves of this report, which stay open or closed when it is shown again. */
+  private charts: HTMLElement | null = null;
   private reports = 0;
   private registries: Registries | null = null;
   private remarks: Remarks | null = null;
@@ -134,7 +137,7 @@ export class Result {
   private get known(): Known {
     const key = JSON.stringify(this.part);
     let found = this.knownOf.get(key);
-    if (!found) { found = { fems: {}, tolerance: null, print: null, shares: {}, began: {} }; this.knownOf.set(key, found); }
+    if (!found) { found = { fems: {}, tolerance: null, print: null, shares: {} }; this.knownOf.set(key, found); }
     return found;
   }
 
@@ -173,9 +176,8 @@ export class Result {
       if (!isRunning() || this.closed) break;
       const { known } = this;
       const found = await this.askComputations(false);
-      const shareOf = (each: Computation<unknown> | undefined): number | null => each && "share" in each ? each.share : null;
+      const shareOf = (each: Computation<unknown> | undefined): Share | null => each && "share" in each ? each : null;
       known.shares = { tolerance: shareOf(found?.tolerance), ...Object.fromEntries(Object.entries(found?.validation ?? {}).map(([level, each]) => [level, shareOf(each)])) };
-      for (const [name, share] of Object.entries(known.shares)) if (share !== null) known.began[name] ??= [share, Date.now()];
       // Only the texts change: buttons are not replaced while they are pressed.
       for (const each of this.element.querySelectorAll<HTMLElement>("[data-share]")) each.textContent = this.shareText(each.dataset["share"]!);
     }
@@ -187,12 +189,12 @@ export class Result {
 
   /** How much of a computation is done and how long it still takes. */
   private shareText(name: string): string {
-    const share = this.known.shares[name];
-    if (share === undefined) return " …";
-    if (share === null) return ", waiting for other checks of parts …";
-    const [first, began] = this.known.began[name] ?? [share, 0];
-    const left = share - first < LEAST_SHARE ? "" : `, about ${duration(((1 - share) * (Date.now() - began)) / (share - first) / 1000)} left`;
-    return `, ${Math.round(100 * share)} %${left} …`;
+    const found = this.known.shares[name];
+    if (found === undefined) return " …";
+    if (found === null || found.share === null) return ", waiting for other checks of parts …";
+    if (found.share === 0 && name !== "tolerance") return `, ${duration(found.seconds)} so far for the mesh and the first state …`;
+    const left = found.left === null ? "" : `, about ${duration(found.left)} left`;
+    return `, ${Math.round(100 * found.share)} % in ${duration(found.seconds)}${left} …`;
   }
 
   /** The model of the printed body. */
@@ -208,7 +210,7 @@ export class Result {
 
   private async loadReport(): Promise<void> {
     const asked = ++this.reports;
-    this.report = null;
+    this.report = this.charts = null;
     this.showTable();
     const { problem, mask } = this.subject;
     let found: PartReport | string;
@@ -264,7 +266,8 @@ export class Result {
     const models: [string, PartFigures[]][] = [["frames", report.figures]];
     if (solid?.figures) models.push([title, solid.figures]);
     const conditions = columns.length > 0 && h("p", { class: "note" }, `Items with ${report.conditions.join("; ")}.`);
-    clear(this.reportBox, columns.length > 0 && itemTable(columns), conditions, ...figureTables(models));
+    this.charts ??= strokeCharts(report.figures, (name) => isTurning(this.subject.problem, name));
+    clear(this.reportBox, columns.length > 0 && itemTable(columns), conditions, ...figureTables(models), this.charts);
     const better = this.subject.comparison?.efficiency ?? null;
     const defect = unstable ? "The part has no stable path to the full stroke."
       : last && !isMet ? "The specification is not met."

@@ -11,6 +11,10 @@ import { Result } from "./result";
 import { itemTable, otherObjective, verdictOf } from "./specification";
 import { runMessage, REMEDIES, sentence, statusName } from "./text";
 
+/** Titles of the button that ends a refinement or a search. */
+const TAKE = "Stop and take the result";
+const CHOOSE = "Stop and choose the best";
+
 export class RunPage {
   readonly element = h("div", { class: "page run" });
   private drawing: LatticeDrawing | null = null;
@@ -196,7 +200,10 @@ export class RunPage {
     const specified = Boolean(this.run.problem.specification);
     const tried = this.update?.tried;
     const refined = this.update?.refined;
-    const refining = refined && `${count(refined.designs, "design")}, ${count(refined.geometries, "shape")} computed${refined.sheets ? `, ${count(refined.sheets, "check")} ${isInSpace(this.run.problem) ? "with deviations of the print" : "in the 2D solid"}` : ""}`;
+    // No time left: a refinement ends when it gains nothing more, often long before its largest number of shapes.
+    const pace = running && refined?.seconds != null ? `, ${figure(refined.seconds, refined.seconds < 1 ? 2 : refined.seconds < 10 ? 1 : 0)} s each; it can end earlier` : "";
+    const bound = refined && refined.geometries < refined.most ? ` of at most ${run.refine ? "" : "about "}${refined.most.toLocaleString("en")}` : "";
+    const refining = refined && `${count(refined.designs, "design")}, ${refined.geometries.toLocaleString("en")}${bound} shapes${pace}${refined.sheets ? `, ${count(refined.sheets, "check")} ${isInSpace(this.run.problem) ? "with deviations of the print" : "in the 2D solid"}` : ""}`;
     const phase = refined ? "refinement" : tried ? "verification" : "search";
     const phases = ["search", "verification", ...(specified ? ["refinement"] : [])];
     const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${count(done, "shape")} computed`)]] : [
@@ -217,7 +224,7 @@ export class RunPage {
     bar.value = share;
     clear(this.live.querySelector("dl")!, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
     const reached = this.update?.moved?.items;
-    clear(this.items, !this.result && reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by the ${this.update!.moved!.problem ? "best refined design so far" : "best design so far, before refinement"}${reached.every(({ met }) => met) && run.status === "running" ? "; “Stop and choose the best” is possible" : ""}.`),
+    clear(this.items, !this.result && reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by the ${this.update!.moved!.problem ? "best refined design so far" : "best design so far, before refinement"}${reached.every(({ met }) => met) && run.status === "running" ? `; “${run.refine ? TAKE : CHOOSE}” is possible` : ""}.`),
       !this.result && reached && itemTable([{ title: "frames", items: reached }]));
     if (run.message && run.status !== "running") this.showMessage(run);
     if (!this.result) {
@@ -304,7 +311,7 @@ export class RunPage {
     const refines = Boolean(run.problem.specification) && !run.refine;
     clear(this.controls,
       (status === "running" || status === "queued") && button("Pause", () => void act("pause", "Pausing …")()),
-      status === "running" && button(run.refine ? "Stop and take the result" : "Stop and choose the best", () => void act("stop", run.refine ? "Stopping the refinement …" : "Choosing and verifying the best design …")(), "strong"),
+      status === "running" && button(run.refine ? TAKE : CHOOSE, () => void act("stop", run.refine ? "Stopping the refinement …" : "Choosing and verifying the best design …")(), "strong"),
       status === "running" && !run.refine && button("Open the best so far", () => void keep(), "", { title: "Store it in the gallery, and open it in another tab; the search goes on" }),
       (status === "paused" || (status === "stopped" && !run.refine) || status === "failed") && button(status === "failed" ? "Retry" : "Continue", () => void act("resume")(), "strong"),
       status === "paused" && !run.refine && button("Choose the best", () => void act("stop")()),

@@ -61,6 +61,18 @@ export function figureColumns(models: [title: string, figures: PartFigures[]][])
   });
 }
 
+/** Positive side of each axis. */
+const SIDES = ["the right", "the back", "above"];
+/** Cosine of the angle to an axis of coordinates from which on the hand of a rotation is that seen from its positive side. */
+const ALONG = 0.9;
+
+/** Axis and hand of a rotation in space, which is right-handed about the axis. */
+export function turnText(axis: [number, number, number]): string {
+  const about = `about (${axis.map((value) => String(Number(value.toFixed(2)) + 0).replace("-", "−")).join(", ")})`;
+  const k = axis.findIndex((value) => Math.abs(value) >= ALONG);
+  return k < 0 ? `${about}, right-handed` : `${about}, ${axis[k]! > 0 ? "counter-clockwise" : "clockwise"} seen from ${SIDES[k]}`;
+}
+
 /** A table of figures for all outputs and models, or one for each output if there would be too many columns beside a drawing. */
 export function figureTables(models: [title: string, figures: PartFigures[]][]): HTMLElement[] {
   const columns = figureColumns(models);
@@ -75,7 +87,7 @@ export function figureTable(columns: FigureColumn[]): HTMLElement {
     ["output / input motion", (row) => figure(row.efficiency, 2)],
     ["motion of the output", (row) => unit(row.travel_mm, 2, "mm")],
     ["off-axis motion", (row) => (row.off_axis == null ? "–" : `${figure(100 * row.off_axis, 1)}\u00a0%${row.travel_mm == null ? "" : ` (${figure(row.off_axis * Math.abs(row.travel_mm), 2)}\u00a0mm)`}`)],
-    ["rotation of the output", (row) => unit(row.rotation_deg, 1, "°")],
+    ["rotation of the output", (row) => `${unit(row.rotation_deg, 1, "°")}${row.rotation_axis && row.rotation_deg != null ? ` ${turnText(row.rotation_axis)}` : ""}`],
     ["deformation of the output", (row) => unit(row.output_deformation_mm, 2, "mm"), "of its nodes from a rigid motion"],
     ["payload that halves the motion", (row) => weight(row.payload_N), "a load that grows with the input"],
     ["dead load that halves the motion", (row) => weight(row.dead_load_N), "a weight that acts before the input"],

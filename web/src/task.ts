@@ -61,6 +61,8 @@ export interface Built {
   fault: { key: string; message: string } | null;
   problem: Problem | null;
   items: { name: string; label: string; wanted: string }[];
+  /** Inputs and loads of each load case in words. */
+  conditions: { case: string; texts: string[] }[];
 }
 
 /** Kinds of zones of a domain. */

@@ -124,7 +124,8 @@ def sheet_records(
         gives the problem and the material only, and a bound on the clearance of its struts has no
         meaning.
     quantities
-        Names of quantities that are recorded for each output besides items and objectives.
+        Names of quantities that are recorded for each output besides items and objectives. In space
+        the channel ``rotation_vector`` is then recorded beside each rotation, degrees.
 
     Returns
     -------
@@ -155,6 +156,24 @@ def sheet_records(
         for name, record in records.items():
             records[name] = replace(record, given={**record.given, "strut_loss": loss})
     return records
+
+
+def path_count(problem: Problem, case: str) -> int:
+    """Return the number of paths to the full stroke that the items of a load case need.
+
+    Parameters
+    ----------
+    problem
+        Problem with a specification.
+    case
+        Name of the load case.
+    """
+    wanted = problem.specification
+    assert wanted is not None
+    terms: list[Item | ObjectiveTerm] = [*wanted.items, *wanted.maximise]
+    own = [each for each in terms if each.case == case]
+    needed = {channel for each in own for channel in channels_of(each.quantity, each.output)}
+    return 1 + sum(channel.name in OWN_PATHS for channel in needed)
 
 
 class _Sheet:
@@ -188,6 +207,9 @@ class _Sheet:
         wanted = [(each.quantity, each.output) for each in items]
         wanted += [(quantity, output) for output in self.case.outputs for quantity in quantities]
         needed = dict.fromkeys(channel for each in wanted for channel in channels_of(*each))
+        turned = [channel.output for channel in needed if channel.name == "rotation"]
+        if quantities and self.part.dimension == 3:
+            needed |= dict.fromkeys(Channel("rotation_vector", output) for output in turned)
         paths = 1 + sum(channel.name in OWN_PATHS for channel in needed)
 
         def share(done: int, load: float) -> None:
@@ -258,8 +280,10 @@ class _Sheet:
         name = channel.name
         if name == "motion":
             return self._means(main.motion, problem)
-        if name == "rotation":
-            return self._rotation(main, problem)
+        if name in {"rotation", "rotation_vector"}:
+            found = self._rotations(main, problem)
+            is_size = name == "rotation" and found.ndim == 2
+            return np.asarray(np.linalg.norm(found, axis=1)) if is_size else found
         if name == "displacement":
             return np.asarray(main.motion[:, problem.output.nodes].mean(axis=1))
         if name == "input_motion":
@@ -277,14 +301,13 @@ class _Sheet:
         given = self.case.input
         return np.asarray((main.motion[:, given.nodes] * given.direction).sum(axis=2).mean(axis=1))
 
-    def _rotation(self, main: SheetPath, problem: Problem) -> Values:
-        """Return (S,) the rotation of the output, degrees; in space its size."""
+    def _rotations(self, main: SheetPath, problem: Problem) -> Values:
+        """Return (S,) the rotation of the output, degrees; in space (S, 3) its vector."""
         turns = [
             output_rotation(problem, self.mesh, motion, field)
             for motion, field in zip(main.motion, main.fields, strict=True)
         ]
-        found = np.array(turns, dtype=np.float64)
-        return found if found.ndim == 1 else np.asarray(np.linalg.norm(found, axis=1))
+        return np.array(turns, dtype=np.float64)
 
     def _stiffness(self, main: SheetPath, problem: Problem) -> Values:
         """Return (1,) the stiffness of the output at full stroke, lattice units."""

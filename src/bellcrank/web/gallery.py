@@ -27,11 +27,12 @@ from bellcrank.model import (
 from bellcrank.model.gallery import Kind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
 
+    from bellcrank.model import Problem
     from bellcrank.web.jobs import Jobs
 
 NAME = re.compile(r"[a-z0-9]{12}")
@@ -257,14 +258,12 @@ class Gallery:
 def thumbnail_data(source: str, entry: Entry) -> dict[str, Any]:
     """Return an entry with the coordinates of its present beams."""
     design = entry.design
-    problem, lattice = design.problem, design.problem.lattice
-    drawn = projected(lattice.positions)
-    ends = drawn[lattice.beams[design.mask]]
-    marks = (
-        ("supports", problem.supports.nodes),
-        ("input", problem.input.nodes),
-        ("output", problem.output.nodes),
-    )
+    problem = design.problem
+    marks = {
+        "supports": problem.supports.nodes,
+        "input": problem.input.nodes,
+        "output": problem.output.nodes,
+    }
     return {
         "source": source,
         "key": entry.key,
@@ -274,11 +273,20 @@ def thumbnail_data(source: str, entry: Entry) -> dict[str, Any]:
         "problem": problem.name,
         "efficiency": None if design.efficiency is None else finite(design.efficiency),
         "beams": design.beam_count,
-        "picture": {
-            "lines": ends.round(2).ravel().tolist(),
-            **{name: drawn[nodes].round(2).ravel().tolist() for name, nodes in marks},
-            "box": np.concatenate([drawn.min(axis=0), drawn.max(axis=0)]).round(2).tolist(),
-        },
+        "picture": picture_of(problem, design.mask, marks),
+    }
+
+
+def picture_of(
+    problem: Problem, mask: NDArray[np.bool_], marks: Mapping[str, NDArray[np.int64]]
+) -> dict[str, list[float]]:
+    """Return the coordinates of the beams of a design, of marked nodes, and of their box."""
+    drawn = projected(problem.lattice.positions)
+    ends = drawn[problem.lattice.beams[mask]]
+    return {
+        "lines": ends.round(2).ravel().tolist(),
+        **{name: drawn[nodes].round(2).ravel().tolist() for name, nodes in marks.items()},
+        "box": np.concatenate([drawn.min(axis=0), drawn.max(axis=0)]).round(2).tolist(),
     }
 
 

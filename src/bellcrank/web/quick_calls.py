@@ -27,7 +27,7 @@ from bellcrank.web.items import item_states, objective_states, wanted_of_prints
 from bellcrank.web.task_files import problem_of
 from bellcrank.workflows.condition_texts import condition_texts
 from bellcrank.workflows.figures import model_words
-from bellcrank.workflows.part_figures import part_figures
+from bellcrank.workflows.part_figures import LEAST_ROTATION, part_figures
 from bellcrank.workflows.specification import evaluated
 
 if TYPE_CHECKING:
@@ -203,19 +203,27 @@ def motion(text: str, mask: str, case: str = "") -> dict[str, Any]:
         "efficiency": [finite(each) for each in path.efficiency],
         "force": [finite(each) for each in path.input_force],
         "snapped": path.snapped.tolist(),
-        "rotation": _rotations(problem, path.displacement),
+        **_rotations(problem, path.displacement),
         "model": model_words(problem, elements),
     }
 
 
-def _rotations(problem: Problem, displacement: NDArray[np.float64]) -> list[float | None]:
-    """Return the rotation of the first output with several nodes, degrees; in space its size."""
+def _rotations(problem: Problem, displacement: NDArray[np.float64]) -> dict[str, list[Any]]:
+    """Return the rotation of the first output with several nodes, degrees; in space size and axis.
+
+    None for each state without such an output, and for the axis of a small rotation.
+    """
     wide = [each.nodes for each in problem.outputs.values() if len(each.nodes) > 1]
     if not wide:
-        return [None] * len(displacement)
+        return {"rotation": [None] * len(displacement), "axis": [None] * len(displacement)}
     rest = problem.lattice.positions[wide[0]]
     found = [best_fit_rotation(rest, moved[wide[0]]) for moved in displacement]
-    return [round(float(np.linalg.norm(each) if each.ndim else each), 2) for each in found]
+    sizes = [float(np.linalg.norm(each) if each.ndim else each) for each in found]
+    axes = [
+        (each / size).round(3).tolist() if each.ndim and size >= LEAST_ROTATION else None
+        for each, size in zip(found, sizes, strict=True)
+    ]
+    return {"rotation": [round(size, 2) for size in sizes], "axis": axes}
 
 
 def sensitivity(text: str, mask: str) -> dict[str, Any]:

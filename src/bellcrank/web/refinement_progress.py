@@ -42,13 +42,18 @@ class RefinementReporter:
         self._latest: dict[int, RefinementProgress] = {}
         self._best: dict[int, RefinementProgress] = {}
         self._nearest: dict[int, RefinementProgress] = {}
+        self._before = 0
         self._sent: Design | None = None
         self._sent_at = 0.0
+        self._began: float | None = None
 
     def add(self, number: int, progress: RefinementProgress) -> None:
         """Record a geometry of the refinement of a design."""
         from bellcrank.refine.by_frames import MET
 
+        if self._began is None:
+            self._began = time.monotonic()
+            self._before = progress.evaluations
         self._latest[number] = progress
         self._count.add(number, progress.evaluations)
         if progress.rows.violation > MET:
@@ -76,19 +81,25 @@ class RefinementReporter:
     def summary(self) -> dict[str, Any] | None:
         """Return the numbers of designs, geometries and sheets, and the best objective.
 
-        The objective is that of the latest geometries that meet all items. None before the first.
+        ``seconds`` is the mean time of a geometry since the first one was reported, None before
+        the second. The objective is that of the latest geometries that meet all items.
+        None before the first geometry.
         """
         from bellcrank.refine.by_frames import MET
 
         latest = self._latest.values()
         if not latest:
             return None
+        done = self._count.done - self._before
+        assert self._began is not None
+        passed = time.monotonic() - self._began
         met = [each.rows.objective for each in latest if each.rows.violation <= MET]
         return {
             "designs": len(latest),
             "geometries": self._count.done,
             "sheets": sum(each.sheets for each in latest),
             "most": self._count.most,
+            "seconds": round(passed / done, 3) if done > 0 else None,
             "objective": float(max(met)) if met else None,
         }
 

@@ -6,6 +6,7 @@ from functools import cache
 from typing import Any
 
 from bellcrank.fem import levels
+from bellcrank.fem.results import finite
 from bellcrank.part import materials
 from bellcrank.search import DEFAULT_SEARCH, searches
 from bellcrank.task.schema import ToleranceSection
@@ -29,9 +30,9 @@ CELL_TITLES = {
 def registered() -> dict[str, list[dict[str, Any]]]:
     """Return searches, materials, file formats, levels and lattices in space as plain data.
 
-    ``tolerance`` has the usual deviations, for the fields of a task that are empty. The default
-    search comes first; the other entries are in the order of registration. Each entry has
-    ``name`` and ``title``.
+    ``tolerance`` has the usual deviations, for the fields of a task that are empty. The strain
+    limit of a material is None if it is not known. The default search comes first; the other
+    entries are in the order of registration. Each entry has ``name`` and ``title``.
     """
     usual = ToleranceSection()
     methods = sorted(searches, key=lambda name: name != DEFAULT_SEARCH)
@@ -62,6 +63,7 @@ def registered() -> dict[str, list[dict[str, Any]]]:
                 "title": MATERIAL_TITLES.get(name, name.replace("-", " ").upper()),
                 "young": material.young,
                 "poisson": material.poisson,
+                "strain_limit": finite(material.strain_limit),
             }
             for name, material in materials.items()
         ],

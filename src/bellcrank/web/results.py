@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import hashlib
 import json
+import time
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
@@ -123,10 +124,11 @@ class StoredResults:
         """Return what is known of a computation: ``result``, or ``share`` while it runs.
 
         None if it was not begun, or if it does not run and only that is asked for. The share is
-        None if it is not known.
+        None if it is not known; ``seconds`` are those since the computation began, ``left`` those
+        that it still takes by the estimate of `ShareFile`, None if that is not known or has passed.
         """
         if self._results.is_running(key):
-            return {"share": _share(self._path(key, "share"))}
+            return _progress(self._path(key, "share"))
         found = None if running else self._stored(key)
         return None if found is None else {"result": found}
 
@@ -170,9 +172,15 @@ class StoredResults:
             path.unlink(missing_ok=True)
 
 
-def _share(path: Path) -> float | None:
-    """Return the fraction that a computation has written; None if there is none yet."""
+def _progress(path: Path) -> dict[str, float | None]:
+    """Return the fraction that a computation has written, the seconds so far, and those left."""
     try:
-        return float(path.read_text(encoding="ascii"))
+        share, seconds, left = map(float, path.read_text(encoding="ascii").split())
+        since = max(time.time() - path.stat().st_mtime, 0.0)
     except (OSError, ValueError):
-        return None
+        return {"share": None, "seconds": None, "left": None}
+    return {
+        "share": share,
+        "seconds": round(seconds + since),
+        "left": round(left - since) if left > since else None,
+    }

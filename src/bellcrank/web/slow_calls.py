@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -134,9 +135,11 @@ def _export(design: Design, spec: PartSpec, path: Path, grips: Grips) -> None:
 
 
 class ShareFile:
-    """A file with the fraction of a computation that is done, for another process.
+    """A file with the fraction of a computation that is done, its seconds so far, and those left.
 
-    It is written when the computation begins.
+    It is for another process, and written when the computation begins. The time left follows from
+    that between the first fraction above 0 and the present one, since what comes before, such as
+    a mesh, may take longer than the rest; it is nan until then.
 
     Parameters
     ----------
@@ -147,14 +150,24 @@ class ShareFile:
     def __init__(self, path: str) -> None:
         self._path = path
         self._written = -LEAST_SHARE
+        self._began = time.monotonic()
+        self._first: tuple[float, float] | None = None
         self(0.0)
 
     def __call__(self, share: float) -> None:
         """Write the fraction, unless it has hardly changed."""
         if self._path and share - self._written >= LEAST_SHARE:
             self._written = share
+            seconds, left = time.monotonic() - self._began, math.nan
+            if self._first is not None:
+                done, before = self._first
+                left = (1.0 - share) * (seconds - before) / (share - done)
+            elif share > 0.0:
+                self._first = share, seconds
             with contextlib.suppress(OSError):
-                Path(self._path).write_text(f"{share:.3f}", encoding="ascii")
+                Path(self._path).write_text(
+                    f"{share:.3f} {seconds:.1f} {left:.1f}", encoding="ascii"
+                )
 
 
 def part_summary(
@@ -319,14 +332,17 @@ def validation(
     from bellcrank.fem import FemSettings
     from bellcrank.part import PartSpec
     from bellcrank.workflows import validate
-    from bellcrank.workflows.validation import has_items
 
     spec, design = PartSpec.from_dict(part), design_of(text, mask)
     # The specification is that of the part that is shown.
     design = replace(design, provenance={"part": part})
-    stages, write = 1 + has_items(design, spec), ShareFile(share)
+    # The first path is that of the analysis; the items need others, which take as long.
+    paths, write = (1, _item_paths(design, spec, level)), ShareFile(share)
     validation = validate(
-        design, spec, [(level, FemSettings())], lambda index, done: write((index + done) / stages)
+        design,
+        spec,
+        [(level, FemSettings())],
+        lambda index, done: write((index + done * paths[index]) / sum(paths)),
     )
     analysis = validation.analyses[0]
     data: dict[str, Any] = validation.to_dict()["results"][0]
@@ -354,6 +370,18 @@ def validation(
         "items": items,
         "figures": validation.figures.get(BODIES.get(level, "")),
     }
+
+
+def _item_paths(design: Design, spec: PartSpec, level: str) -> int:
+    """Return the number of paths that the items of a specification need at a level."""
+    from bellcrank.workflows.validation import BODY_LEVELS, has_items
+
+    problem = design.problem
+    if not has_items(design, spec) or level != BODY_LEVELS[problem.lattice.dimension][0]:
+        return 0
+    from bellcrank.fem.specification import path_count
+
+    return sum(path_count(problem, case) for case in problem.cases)
 
 
 def machine(plan: dict[str, Any], designs: dict[str, str]) -> dict[str, Any]:

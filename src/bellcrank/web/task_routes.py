@@ -12,6 +12,7 @@ from bellcrank.task.schema import SCHEMA
 from bellcrank.web.requests import ProblemBody, TableBody, TextBody
 from bellcrank.web.state import State
 from bellcrank.web.task_files import problem_of, read_region, read_upload, to_toml
+from bellcrank.web.task_pictures import task_pictures
 from bellcrank.web.task_tables import (
     bundled_table,
     known_tasks,
@@ -27,6 +28,12 @@ router = APIRouter(prefix="/api/tasks", tags=["tasks"])
 def list_tasks() -> list[dict[str, str]]:
     """Return name and description of the bundled tasks."""
     return known_tasks()
+
+
+@router.get("/pictures")
+async def list_pictures() -> list[dict[str, Any]]:
+    """Return small pictures of the bundled tasks."""
+    return await run_in_threadpool(task_pictures)
 
 
 @router.post("/build")

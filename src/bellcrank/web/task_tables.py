@@ -22,6 +22,7 @@ from bellcrank.task.shapes import nodes_at
 from bellcrank.web.errors import plain_error
 from bellcrank.web.items import wanted_items
 from bellcrank.web.limits import NODES, check_lattice, check_size
+from bellcrank.workflows.condition_texts import texts_of_cases
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -237,7 +238,7 @@ def task_data(data: Mapping[str, Any]) -> dict[str, Any]:
     dict
         ``lattice`` and ``part``; ``regions``, the nodes of each table with a region; ``missing``,
         the key of the first table without one; ``fault``, why there is no problem; ``problem`` and
-        its ``items``.
+        its ``items``; ``conditions``, the inputs and loads of each load case in words.
 
     Raises
     ------
@@ -256,6 +257,7 @@ def task_data(data: Mapping[str, Any]) -> dict[str, Any]:
         "fault": None,
         "problem": None,
         "items": [],
+        "conditions": [],
     }
     if missing is None:
         try:
@@ -265,6 +267,10 @@ def task_data(data: Mapping[str, Any]) -> dict[str, Any]:
         else:
             found["problem"] = problem_to_dict(task.problem)
             found["items"] = wanted_items(task.problem, task.part)
+            found["conditions"] = [
+                {"case": name, "texts": texts}
+                for name, texts in texts_of_cases(task.problem, task.part).items()
+            ]
     return found
 
 

@@ -22,8 +22,12 @@ if TYPE_CHECKING:
     from bellcrank.part import PartSpec
     from bellcrank.task import ProblemUnits
 
+    Points = NDArray[np.float64]
+
 NAMED = 0.9999
 """Cosine of the angle to a direction with a name above which the name is used."""
+FEW_NODES = 2
+"""Largest number of nodes that are named each by its place."""
 
 
 def condition_texts(problem: Problem, part: PartSpec) -> list[str]:
@@ -42,19 +46,17 @@ def condition_texts(problem: Problem, part: PartSpec) -> list[str]:
     --------
     >>> from bellcrank.task import find_task
     >>> task = find_task("selector")
-    >>> condition_texts(task.problem, task.part)
-    ['A: input 3 mm right', 'B: input 3 mm left']
+    >>> for text in condition_texts(task.problem, task.part):
+    ...     print(text)
+    A: input 3 mm right on 3 nodes between (1, 36.3) and (6, 53.7) mm
+    B: input 3 mm left on 3 nodes between (96, 36.3) and (101, 53.7) mm
     """
-    units = units_of(problem, part)
     several = len(problem.cases) > 1
-    found = []
-    for name, case in problem.cases.items():
-        start = f"{name}: " if several else ""
-        springs = [
-            _output_text(key, each, units) for key, each in case.outputs.items() if each.spring
-        ]
-        texts = [*_input_texts(case.input, units), *_load_texts(case.loads, units), *springs]
-        found += [f"{start}{text}" for text in texts]
+    found = [
+        f"{name}: {text}" if several else text
+        for name, texts in texts_of_cases(problem, part).items()
+        for text in texts
+    ]
     wanted, material = problem.specification, part.registered_material
     items = () if wanted is None else wanted.items
     if math.isnan(material.strain_limit) and not any(each.quantity == "strain" for each in items):
@@ -62,17 +64,35 @@ def condition_texts(problem: Problem, part: PartSpec) -> list[str]:
     return found
 
 
-def _input_texts(given: Input, units: ProblemUnits) -> list[str]:
-    """Return a text for each range of the stroke in which nodes of an input move."""
-    if given.drive == "force":
-        size = f"of {units.in_part('force', given.amount):.3g} N"
-    else:
-        size = f"{units.in_part('length', given.amount):.3g} mm"
+def texts_of_cases(problem: Problem, part: PartSpec) -> dict[str, list[str]]:
+    """Return input and loads of each load case in words, with the places of their nodes."""
+    units = units_of(problem, part)
+    positions = problem.lattice.positions * part.scale
+    return {
+        name: [
+            *_input_texts(case.input, units, positions),
+            *_load_texts(case.loads, units, positions),
+            *(_output_text(key, each, units) for key, each in case.outputs.items() if each.spring),
+        ]
+        for name, case in problem.cases.items()
+    }
+
+
+def _input_texts(given: Input, units: ProblemUnits, positions: Points) -> list[str]:
+    """Return one text for the nodes of each direction and part of the stroke."""
+    keys = np.hstack([given.direction.round(4), given.ranges])
+    _, first, group = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     found = []
-    for span in np.unique(given.ranges, axis=0):
-        own = (given.ranges == span).all(axis=1)
-        text = f"input {size} {_direction(given.direction[own])}"
-        found.append(text if tuple(span) == WHOLE else f"{text}, {_range_text(span)}")
+    for index in np.argsort(first):
+        own = group.ravel() == index
+        if given.drive == "force":
+            size = f"of {units.in_part('force', given.amount) * own.sum():.3g} N"
+        else:
+            size = f"{units.in_part('length', given.amount):.3g} mm"
+        span = tuple(given.ranges[own][0])
+        part = "" if span == WHOLE else f", {_range_text(span)}"
+        where = _at_nodes(given.nodes[own], positions)
+        found.append(f"input {size} {_direction(given.direction[own])} {where}{part}")
     return found
 
 
@@ -86,25 +106,34 @@ def _output_text(name: str, output: Output, units: ProblemUnits) -> str:
     return f"spring of {size:.3g} N/mm against {name}"
 
 
-def _load_texts(loads: Loads, units: ProblemUnits) -> list[str]:
+def _load_texts(loads: Loads, units: ProblemUnits, positions: Points) -> list[str]:
     found = []
     for force in loads.forces:
         whole = force.force.sum(axis=0)
         size = units.in_part("force", float(np.linalg.norm(whole)))
-        where = f"{_direction(whole)} on {_nodes(force.nodes)}"
+        where = f"{_direction(whole)} {_at_nodes(force.nodes, positions)}"
         when = "with the input" if force.during is None else _range_text(force.during)
         found.append(f"load of {size:.3g} N in all {where}, grows {when}")
     for spring in loads.springs:
         size = units.in_part("stiffness", spring.stiffness * len(spring.nodes))
         towards = _direction(spring.direction)
-        found.append(f"spring of {size:.3g} N/mm at {_nodes(spring.nodes)}, {towards}")
+        found.append(f"spring of {size:.3g} N/mm {_at_nodes(spring.nodes, positions)}, {towards}")
     if loads.weight is not None:
         found.append(f"own weight {_direction(loads.weight)}, grows with the input")
     return found
 
 
-def _nodes(nodes: NDArray[np.int64]) -> str:
-    return "1 node" if len(nodes) == 1 else f"{len(nodes)} nodes"
+def _at_nodes(nodes: NDArray[np.int64], positions: Points) -> str:
+    """Return the places of few nodes, or the corners of the box that holds them."""
+    own = positions[nodes]
+    if len(own) <= FEW_NODES:
+        return f"at {' and '.join(map(_point, own))} mm"
+    low, high = _point(own.min(axis=0)), _point(own.max(axis=0))
+    return f"on {len(own)} nodes between {low} and {high} mm"
+
+
+def _point(position: NDArray[np.float64]) -> str:
+    return f"({', '.join(f'{value:g}' for value in position.round(1) + 0.0)})"
 
 
 def _direction(vectors: NDArray[np.float64]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from bellcrank.mechanics import (
 )
 from bellcrank.mechanics.frames.analysis import strain_amplitude
 from bellcrank.mechanics.frames.output_loads import with_output
+from bellcrank.mechanics.frames.quantities.motion import rotation_vector
 from bellcrank.mechanics.output import deformation_of
 from bellcrank.task import units_of
 
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
 
 SHEET_QUANTITIES = ("gain", "off_axis", "rotation", "input_force", "strain", "stiffness")
 """Quantities of the figures in the sheet."""
+LEAST_ROTATION = 0.05
+"""Rotation below which its axis is not reported, degrees."""
 STATES = 16
 """Number of states along the stroke."""
 LOAD_TRIALS = 12
@@ -57,7 +61,10 @@ def part_figures(design: Design, spec: PartSpec, elements: int | None = 8) -> li
     -------
     list of dict
         Plain data with units in the keys; None where a figure does not exist. ``path_mm`` are the
-        displacements of the output at equal fractions of the stroke.
+        displacements of the output at equal fractions of the stroke. ``rotation_deg`` is the size
+        of the largest rotation along the stroke, ``rotation_axis`` its axis in space, about which
+        it is right-handed. ``curve`` has the motion of the input, that of the output along its
+        direction, its rotation and the input force from rest to the full stroke.
 
     Examples
     --------
@@ -144,6 +151,7 @@ def _along(record: StrokeRecord, output: str, units: ProblemUnits) -> dict[str, 
         "input_mm": finite(units.in_part("length", moved[-1])),
         "off_axis": finite(off_axis),
         "rotation_deg": finite(float(np.abs(record.of("rotation", output)).max())),
+        "rotation_axis": _axis(record.channels.get(Channel("rotation_vector", output))),
         "input_force_N": finite(units.in_part("force", force[-1])),
         "largest_input_force_N": finite(units.in_part("force", force.max())),
         "strain": finite(record.of("strain").max()),
@@ -151,7 +159,29 @@ def _along(record: StrokeRecord, output: str, units: ProblemUnits) -> dict[str, 
             units.in_part("stiffness", record.of("stiffness", output)[0])
         ),
         "sag_mm": finite(units.in_part("length", sag)),
+        "curve": {
+            "input_mm": _from_rest(units.in_part("length", 1.0) * moved),
+            "output_mm": _from_rest(units.in_part("length", 1.0) * travel),
+            "rotation_deg": _from_rest(record.of("rotation", output)),
+            "input_force_N": _from_rest(units.in_part("force", 1.0) * force),
+        },
     }
+
+
+def _from_rest(values: Values) -> list[float | None]:
+    """Return values along the stroke after 0 at rest."""
+    return [finite(float(f"{value:.5g}")) for value in (0.0, *values.tolist())]
+
+
+def _axis(vectors: Values | None) -> list[float] | None:
+    """Return the unit vector of the largest of (F, 3) rotation vectors; None if all are small."""
+    if vectors is None:  # in the plane
+        return None
+    sizes = np.linalg.norm(vectors, axis=1)
+    if not np.isfinite(sizes).all() or sizes.max() < LEAST_ROTATION:
+        return None
+    axis: list[float] = (vectors[sizes.argmax()] / sizes.max()).round(3).tolist()
+    return axis
 
 
 def _motion(evaluator: CaseEvaluator, output: str, units: ProblemUnits) -> dict[str, Any]:
@@ -163,6 +193,8 @@ def _motion(evaluator: CaseEvaluator, output: str, units: ProblemUnits) -> dict[
     own = [Channel(name, output) for name in names]
     shared = [Channel("input_motion"), Channel("input_force"), Channel("strain")]
     found = evaluator.values([*own, *shared], fractions.tolist())
+    if evaluator.problem.lattice.dimension == 3:
+        found[Channel("rotation_vector", output)] = _rotation_vectors(evaluator, output, fractions)
     motion, moved = found[Channel("motion", output)], found[Channel("input_motion")]
     half = STATES // 2 - 1
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -179,6 +211,17 @@ def _motion(evaluator: CaseEvaluator, output: str, units: ProblemUnits) -> dict[
         "limit_points": limit_points(fractions, force),
         "path_mm": np.vstack([np.zeros(path.shape[1]), path]).round(4).tolist(),
     }
+
+
+def _rotation_vectors(evaluator: CaseEvaluator, output: str, fractions: Values) -> Values:
+    """Return (F, 3) the rotation vector of an output, degrees; nan where a state is unknown."""
+    problem = with_output(evaluator.problem, output)
+    states = [evaluator.state(fraction) for fraction in fractions.tolist()]
+    found = [
+        np.full(3, math.nan) if state is None else rotation_vector(replace(state, problem=problem))
+        for state in states
+    ]
+    return np.array(found)
 
 
 def _amplitude(evaluator: CaseEvaluator, fractions: Values) -> float:

@@ -43,6 +43,9 @@ TOP = (
 )  # fmt: skip
 """Figures of the first analysis that are repeated at the top of the JSON result."""
 
+BODY_LEVELS = {2: ("plane", "sheet"), 3: ("solid", "solid")}
+"""Level of the printed body, in which items are computed, and its name, by dimension."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Validation:
@@ -159,16 +162,18 @@ def with_specification(
         for elements in (None, ELEMENTS)
     }
     figures = {model_words(problem, ELEMENTS): part_figures(design, spec, ELEMENTS)}
-    wanted, name = {2: ("plane", "sheet"), 3: ("solid", "solid")}[problem.lattice.dimension]
+    wanted, name = BODY_LEVELS[problem.lattice.dimension]
     sizes = [settings.size for level, settings in validation.plan if level == wanted]
     if sizes:
-        from bellcrank.fem.specification import sheet_records
+        from bellcrank.fem.specification import path_count, sheet_records
 
         assert problem.specification is not None
         names = list(problem.cases)
+        counts = [path_count(problem, name) for name in names]
 
         def progress(name: str, share: float) -> None:
-            report((names.index(name) + share) / len(names))
+            k = names.index(name)
+            report((sum(counts[:k]) + share * counts[k]) / sum(counts))
 
         records = sheet_records(spec.of(design), sizes[0], progress, quantities=SHEET_QUANTITIES)
         if records is not None:

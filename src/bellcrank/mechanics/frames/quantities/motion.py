@@ -136,6 +136,11 @@ def _angle(measures: Values) -> Values:
     return np.asarray(np.linalg.norm(turn, axis=-1))
 
 
+def rotation_vector(equilibrium: Equilibrium) -> Values:
+    """Return (3,) the rotation vector of the output in space, degrees."""
+    return rotation_of(_rotation_measures(equilibrium).value.reshape(3, 3))
+
+
 def _angle_gradient(measures: Floats) -> Floats:
     """Return the derivative of the angle.
 
