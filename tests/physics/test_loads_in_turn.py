@@ -183,6 +183,6 @@ def test_ranges_of_loads_are_written_read_and_shown() -> None:
     assert not whole.has_ranges
     assert whole.hash == hanging(inputs=[INPUT], loads=[LOAD]).problem.hash
     assert condition_texts(problem, task.part) == [
-        "input 3 mm left, from 20% to 100% of the stroke",
-        "load of 0.392 N in all down on 1 node, grows from 0% to 20% of the stroke",
+        "input 3 mm left at (51, 53) mm, from 20% to 100% of the stroke",
+        "load of 0.392 N in all down at (11, 53) mm, grows from 0% to 20% of the stroke",
     ]
