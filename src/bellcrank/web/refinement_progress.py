@@ -82,18 +82,16 @@ class RefinementReporter:
         """Return the numbers of designs, geometries and sheets, and the best objective.
 
         ``seconds`` is the mean time of a geometry since the first one was reported, None before
-        the second. The objective is that of the latest geometries that meet all items.
+        the second. The objective is the largest of geometries that meet all items.
         None before the first geometry.
         """
-        from bellcrank.refine.by_frames import MET
-
         latest = self._latest.values()
         if not latest:
             return None
         done = self._count.done - self._before
         assert self._began is not None
         passed = time.monotonic() - self._began
-        met = [each.rows.objective for each in latest if each.rows.violation <= MET]
+        met = [each.rows.objective for each in self._best.values()]
         return {
             "designs": len(latest),
             "geometries": self._count.done,
