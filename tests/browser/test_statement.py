@@ -87,6 +87,15 @@ def test_supports_and_outputs_of_a_symmetric_design_get_their_images(page: Any) 
     assert counts == [2, 2]
     page.keyboard.press("Control+z")
     until(page, lambda: summary(page, "outputs") == "2 nodes")
+    # Items of one are those of the other.
+    page.locator('input[data-key="outputs-0-off_axis-0"]').fill("7%")
+    page.keyboard.press("Tab")
+    until(
+        page,
+        lambda: [
+            each["off_axis"] for each in task(page)["table"]["cases"][0]["outputs"]
+        ] == [[{"at_most": "7%"}]] * 2,
+    )  # fmt: skip
 
 
 def test_ports_edges_and_zones_follow_the_sides_of_a_part_of_another_size(page: Any) -> None:
@@ -252,14 +261,14 @@ def test_a_weight_acts_before_the_input(page: Any) -> None:
     tool(page, "Loads")
     click(page, *node(page, 20, 70))
     until(page, lambda: len(case().get("loads", [])) == 1)
-    page.get_by_label("before the input").check()
+    page.get_by_text("before the input", exact=True).click()
     until(page, lambda: case()["loads"][0].get("during") == ["0%", "20%"])
     assert case()["inputs"][0]["during"] == ["20%", "100%"]
     until(page, lambda: page.get_by_role("button", name="Design it").is_enabled())
-    page.get_by_label("grows with the input").check()
+    page.get_by_text("grows with the input", exact=True).click()
     until(page, lambda: "during" not in case()["loads"][0])
     assert "during" not in case()["inputs"][0]
-    page.get_by_label("before the input").check()
+    page.get_by_text("before the input", exact=True).click()
     until(page, lambda: "during" in case()["inputs"][0])
     page.get_by_role("button", name="Remove load 1").click()
     until(page, lambda: not case()["loads"] and "during" not in case()["inputs"][0])

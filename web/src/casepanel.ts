@@ -105,9 +105,10 @@ function distanceText({ built, loadCase, task: { table } }: TaskEditor): HTMLEle
 /** A button that adds the mirror image of an input or output of a symmetric design, where it has none. */
 function imageButton(editor: TaskEditor, kind: "inputs" | "outputs", { index }: Target): HTMLElement | null {
   const { task: { table }, built, loadCase } = editor;
-  const { symmetry } = table.limits ?? {};
-  const axis = symmetry === "x" || symmetry === "y" ? symmetry : null;
-  if (!built || !axis || isSpatial(table)) return null;
+  const axis = mirrorAxis(editor);
+  if (!built || !axis) return null;
+  const other = imageIndex(editor, { kind, index });
+  if (other !== null) return h("p", { class: "note" }, `Its mirror image is ${kind.slice(0, -1)} ${other + 1}: amounts and items of both are changed together.`);
   const regions = nodesOf(built, loadCase, kind);
   const nodes = regions[index] ?? [];
   const images = imagesOf(built, axis, nodes);
@@ -143,7 +144,34 @@ function middleButton(editor: TaskEditor, target: Target): HTMLElement | null {
 }
 
 function set(editor: TaskEditor, target: Target, changes: Record<string, unknown>): void {
-  editor.change(withSection(editor.task.table, editor.loadCase, target, changes));
+  let table = withSection(editor.task.table, editor.loadCase, target, changes);
+  const image = imageIndex(editor, target);
+  const shared = Object.fromEntries(Object.entries(changes).filter(([key, value]) => isShared(key, value)));
+  if (image !== null && Object.keys(shared).length) table = withSection(table, editor.loadCase, { ...target, index: image }, shared);
+  editor.change(table);
+}
+
+/** The axis of a mirror symmetry of a design in the plane; null if it has none, or two. */
+function mirrorAxis({ task: { table } }: TaskEditor): "x" | "y" | null {
+  const symmetry = table.limits?.symmetry;
+  return !isSpatial(table) && (symmetry === "x" || symmetry === "y") ? symmetry : null;
+}
+
+/** The input or output whose nodes are the mirror images of those of another; null if there is none. */
+function imageIndex(editor: TaskEditor, { kind, index }: Target): number | null {
+  const { built, loadCase } = editor;
+  const axis = mirrorAxis(editor);
+  if (!built || !axis || (kind !== "inputs" && kind !== "outputs")) return null;
+  const regions = nodesOf(built, loadCase, kind);
+  const images = imagesOf(built, axis, regions[index] ?? []);
+  const found = regions.findIndex((each, k) => k !== index && each.length > 0 && each.length === images.length && each.every((node) => images.includes(node)));
+  return found < 0 ? null : found;
+}
+
+/** Whether a mirror image has the same value: places and directions are mirrored, and bounds of a rotation on one side change sides. */
+function isShared(key: string, value: unknown): boolean {
+  if (["at", "name", "direction", "path"].includes(key)) return false;
+  return key !== "rotation" || !Array.isArray(value) || value.every((bounds: Bounds) => bounds.value !== undefined);
 }
 
 function directionFields(editor: TaskEditor, target: Target, given: InputTable["direction"]): HTMLElement {
@@ -271,7 +299,7 @@ function outputFields(editor: TaskEditor, each: OutputTable, target: Target): Ch
   add.setAttribute("aria-label", "Ask for");
   return [
     ...(several ? [amount(`${key}-name`, "Name", each.name, "", (value) => set(editor, target, { name: value === undefined ? undefined : String(value) }))] : []),
-    choice("Motion of the output", [["moves", "moves"], ["turns", "turns"]] as ["moves" | "turns", string][], turns ? "turns" : "moves", (picked) => set(editor, target, otherMotion(editor, target, each, picked)), `motion-${target.index}`),
+    choice("Motion of the output", [["moves", "moves"], ["turns", "turns"]] as ["moves" | "turns", string][], turns ? "turns" : "moves", (picked) => editor.change(withSection(editor.task.table, editor.loadCase, target, otherMotion(editor, target, each, picked))), `motion-${target.index}`),
     turns && h("p", { class: "note" }, isSpatial(editor.task.table) ? ROTATION_IN_SPACE : "The mean rotation of its nodes counts: counter-clockwise is positive."),
     // The direction of an output that turns matters for its off-axis motion alone.
     (!turns || each.off_axis) && directionFields(editor, target, each.direction ?? "up"),

@@ -382,7 +382,7 @@ export class Editor implements TaskEditor {
 
   /** Show a notice in the drawing; an empty one removes it. */
   private note(text: string): void {
-    clear(this.notice, text);
+    clear(this.notice, text && `${text} `, text && button("Close", () => clear(this.notice), "quiet small"));
     if (text) announce(text);
   }
 

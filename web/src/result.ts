@@ -561,7 +561,7 @@ export class Result {
     });
     screws.dataset.key = "screws";
     return h("div", { class: "grips" }, tick("plate", "Fill the supports to a plate for clamping"),
-      this.grips.plate && field("Number of screw holes (3.4 mm)", screws), tick("pad", "Fill the input to a pad for pushing"), tick("output_pad", "Fill the output to a pad for mounting"),
+      this.grips.plate && field("Number of screw holes (3.4 mm)", screws), tick("pad", "Fill the input to a pad for pushing"), tick("output_pad", "Fill each output to a pad for mounting"),
       this.hasGrips && h("p", { class: "note", "data-gripped": "yes" }, this.grippedText()));
   }
 

@@ -60,7 +60,8 @@ class Grips:
     pointer
         Length of an additional strut at the output, mm; 0 for none.
     output_pad
-        Whether to fill the holes between output nodes to a pad, for a marker.
+        Whether to fill the holes between the nodes of each output to a pad, for a marker or for
+        mounting.
     strict
         Whether a part without holes between these nodes is refused.
     """
@@ -110,7 +111,10 @@ class Grips:
             for name, wanted, nodes in (
                 ("plate", self.plate, problem.supports.nodes),
                 ("pad", self.pad, problem.input.nodes),
-                ("output pad", self.output_pad, problem.output.nodes),
+                *(
+                    (f"pad of {name}", self.output_pad, output.nodes)
+                    for name, output in problem.outputs.items()
+                ),
             )
             if wanted
         }
