@@ -112,8 +112,8 @@ export interface Motion {
   input: number[];
   outputs: Record<string, number[]>;
   supports: number[];
-  /** Displacement of the input in lattice units; none for a force. */
-  stroke: number | null;
+  /** Motion of the input at each state, in lattice units; none for a force. */
+  moved: number[] | null;
   part: number[];
   displacement: number[][];
   energy: number[][];

@@ -293,7 +293,9 @@ function outputFields(editor: TaskEditor, each: OutputTable, target: Target): Ch
     if (name === "path") { set(editor, target, { path: { arc: [20, 60] } }); return; }
     const { bound, example } = USUAL[name as QuantityName];
     const known = each[name as QuantityName] ?? [];
-    set(editor, target, { [name]: [...known, name === "gain" && !known.length ? { maximise: true } : { [bound]: example }] });
+    // What turns as far as possible, or by an angle at least, has further bounds of that kind.
+    const isLarge = name === "rotation" && known.some(({ maximise, at_least, value }) => maximise || at_least !== undefined || value === "maximise");
+    set(editor, target, { [name]: [...known, name === "gain" && !known.length ? { maximise: true } : { [isLarge ? "at_least" : bound]: example }] });
   });
   add.dataset.key = `${key}-add`;
   add.setAttribute("aria-label", "Ask for");

@@ -20,7 +20,7 @@ const TOOLS: [Tool, string, string][] = [
   ["supports", "Supports", "Click nodes to hold them; drag a box to select several, double-click to select a row."],
   ["inputs", "Inputs", "Click the nodes that are pushed; drag the orange arrow to set direction and stroke."],
   ["outputs", "Outputs", "Click the nodes that must move; drag the blue arrow to set the direction."],
-  ["loads", "Loads", "Click nodes on which a force acts, or which a spring holds. Forces grow with the push and are full at its end; a weight that hangs on an output all the time is a dead load of that output."],
+  ["loads", "Loads", "Click nodes on which a force acts, or which a spring holds. Forces grow with the input, or act before it as a weight that hangs on the part."],
   ["zones", "Zones", "Drag to draw a hole, a zone that stays free, or a zone that stays solid."],
   ["hand", "By hand", "Click struts to remove or add them; the part is computed at once."],
 ];

@@ -200,7 +200,7 @@ export class MachinePage {
       ...parts.map((part, k) => this.partBox(part, k)),
       !parts.length && h("section", { class: "step open" }, h("h2", { class: "plain" }, "Parts"),
         h("div", { class: "content" }, h("p", {}, "No parts. Elementary actuators have ports of the same shape, so that each can drive any other."),
-          h("p", { class: "note" }, "To design an actuator of your own, start from one of the tasks “elementary-…”."))));
+          h("p", { class: "note" }, "To design an actuator of your own, start from one of the tasks “element-…”."))));
     if (focused) this.panel.querySelector<HTMLElement>(`[data-key="${focused}"]`)?.focus({ preventScroll: true });
   }
 

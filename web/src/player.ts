@@ -298,9 +298,10 @@ export class Player {
 
   private showReadout(motion: Motion, k: number, t: number): void {
     const near = t > 0.5 ? k + 1 : k;
-    const stroke = motion.stroke === null ? `${figure(100 * this.part, 0)} % of the force` : `${figure(this.part * motion.stroke * this.scale, 2)} mm in`;
+    const moved = motion.moved === null ? null : this.scale * ((1 - t) * motion.moved[k]! + t * motion.moved[Math.min(k + 1, motion.moved.length - 1)]!);
+    const stroke = moved === null ? `${figure(100 * this.part, 0)} % of the force` : `${figure(moved, 2)} mm in`;
     const efficiency = motion.efficiency[near] ?? null;
-    const out = efficiency === null || motion.stroke === null ? "" : `${figure(this.part * motion.stroke * this.scale * efficiency, 2)} mm out`;
+    const out = efficiency === null || moved === null ? "" : `${figure(moved * efficiency, 2)} mm out`;
     const turned = motion.rotation[near];
     const turns = turned != null && isTurning(this.problem, this.loadCase || motion.cases[0]!);
     const axis = motion.axis[near];

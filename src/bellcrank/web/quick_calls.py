@@ -18,6 +18,7 @@ from bellcrank.fem.results import finite
 from bellcrank.mechanics import VERIFICATION_INCREMENT, ModelEvaluator, Status, model_evaluator
 from bellcrank.mechanics.output import best_fit_rotation
 from bellcrank.model import Design, human_design, unpack_mask
+from bellcrank.model.stroke_ranges import share_at
 from bellcrank.part import PartSpec, frame_problem
 from bellcrank.search import SpecificationEvaluator
 from bellcrank.search.clearance import gap_of_frame
@@ -196,7 +197,7 @@ def motion(text: str, mask: str, case: str = "") -> dict[str, Any]:
         "input": problem.input.nodes.tolist(),
         "outputs": {name: each.nodes.tolist() for name, each in problem.outputs.items()},
         "supports": np.concatenate([supports.fixed, supports.fixed_x, supports.fixed_y]).tolist(),
-        "stroke": problem.input.amount if problem.input.drive == "displacement" else None,
+        "moved": _input_motion(problem, path.fraction),
         "part": path.fraction.round(DIGITS).tolist(),
         "displacement": [flat(each) for each in path.displacement],
         "energy": [(each / peak).round(4).tolist() for each in path.energy],
@@ -206,6 +207,15 @@ def motion(text: str, mask: str, case: str = "") -> dict[str, Any]:
         **_rotations(problem, path.displacement),
         "model": model_words(problem, elements),
     }
+
+
+def _input_motion(problem: Problem, fractions: NDArray[np.float64]) -> list[float] | None:
+    """Return the mean motion of the input at fractions of the stroke; None for a force."""
+    given = problem.input
+    if given.drive == "force":
+        return None
+    shares = [float(share_at(given.ranges, each).mean()) for each in fractions.tolist()]
+    return [round(given.amount * each, DIGITS) for each in shares]
 
 
 def _rotations(problem: Problem, displacement: NDArray[np.float64]) -> dict[str, list[Any]]:

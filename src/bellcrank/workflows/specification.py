@@ -73,8 +73,11 @@ def number_text(item: Item, value: float, units: ProblemUnits) -> str:
     >>> number_text(Item(quantity="dead_load", at_least=0.01), float("nan"), units)
     'unstable'
     """
+    if value == math.inf and item.at_least is not None:
+        sign = "at least" if item.quantity == "stable_stroke" else ">"
+        return f"{sign} {number_text(item, item.at_least, units)}"
     if value == math.inf:
-        return "more" if item.at_least is None else f"> {number_text(item, item.at_least, units)}"
+        return "more"
     if not math.isfinite(value):
         return UNSTABLE
     unit = _unit(item)
@@ -177,11 +180,13 @@ def item_rows(
 
 
 def shown_value(item: Item, value: float) -> float:
-    """Return the value of an item; infinite for more than a wanted payload or dead load.
+    """Return the value of an item; infinite for more than a wanted load, or a stable stroke.
 
-    That is extrapolated from the motion under the wanted one, and larger ones may be carried less
-    well.
+    A load is extrapolated from the motion under the wanted one, and larger ones may be carried less
+    well. A stroke is followed up to the wanted part of it.
     """
+    if item.quantity == "stable_stroke" and item.at_least is not None:
+        return math.inf if value >= item.at_least else value
     least = item.at_least if item.quantity in CARRIED else None
     return value if least is None or not value > least else math.inf
 

@@ -35,6 +35,7 @@ from bellcrank.search.blocks import (
     steps_in_block,
 )
 from bellcrank.search.constraints.evaluator import without_base_penalty
+from bellcrank.search.hopping.coarse_start import coarse_start
 from bellcrank.search.hopping.local_search import LocalSearch, start_local_search
 from bellcrank.search.hopping.settings import HoppingSettings
 from bellcrank.search.hopping.state import HoppingState, Member
@@ -55,9 +56,16 @@ PROGRESS = 1e-3
 """Relative gain of efficiency that counts as progress."""
 
 
-def start(evaluator: Evaluator, _settings: HoppingSettings, _chain: int) -> HoppingState:
-    """Return the state before the first local search, at the problem's initial design."""
-    score, mask = initial_response(evaluator).score, pack_mask(evaluator.problem.initial)
+def start(evaluator: Evaluator, settings: HoppingSettings, chain: int) -> HoppingState:
+    """Return the state before the first local search.
+
+    It is at the problem's initial design, or at a better one from a coarser lattice.
+    """
+    score, initial = initial_response(evaluator).score, evaluator.problem.initial
+    coarse = coarse_start(evaluator, settings, chain)
+    if coarse is not None and (found := evaluator.evaluate(coarse).score) > score:
+        score, initial = found, coarse
+    mask = pack_mask(initial)
     return HoppingState(0, mask, score, population=(Member(mask, score),))
 
 

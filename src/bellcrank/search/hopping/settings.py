@@ -19,10 +19,17 @@ class Limits(NamedTuple):
     stall: float
     largest_batch: int
     restart_after: float
+    coarse_beams: int
 
 
-SPRINGS = Limits(max_failures=12, min_stall=2000, stall=0.4, largest_batch=1, restart_after=15.0)
-FRAMES = Limits(max_failures=24, min_stall=1000, stall=0.15, largest_batch=1, restart_after=0.0)
+SPRINGS = Limits(
+    max_failures=12, min_stall=2000, stall=0.4, largest_batch=1, restart_after=15.0,
+    coarse_beams=5000,
+)  # fmt: skip
+FRAMES = Limits(
+    max_failures=24, min_stall=1000, stall=0.15, largest_batch=1, restart_after=0.0,
+    coarse_beams=2500,
+)  # fmt: skip
 """For frames, predictions are less accurate and Metropolis phases gain more: 8 chains of 20,000
 designs of the crane ended at 9.9 in the mean, and with the values for springs at 8.6. With batches
 of 64 flips, 6 such chains ended at 7.0 (median), and at 8.6 with single flips."""
@@ -80,6 +87,11 @@ class HoppingSettings(SearchSettings):
         Fraction of the local searches that start from a combination of two designs.
     restart_archive
         Largest number of designs in the archive.
+    coarse_beams
+        Number of designable beams above which the search starts from the result of a search on a
+        coarser lattice. It depends on the model, too.
+    coarse_steps
+        Steps of that search, at most as many as of the search itself.
 
     Raises
     ------
@@ -106,12 +118,15 @@ class HoppingSettings(SearchSettings):
     restart_temperature: float = 0.003
     restart_recombination: float = 0.5
     restart_archive: int = 8
+    coarse_beams: int | None = None
+    coarse_steps: int = 5000
 
     def __post_init__(self) -> None:
         SearchSettings.__post_init__(self)
         for name, least in (
             ("largest_batch", 1), ("max_failures", 1), ("phase_steps", 0), ("min_stall", 0),
-            ("restart_chains", 1), ("restart_archive", 1),
+            ("restart_chains", 1), ("restart_archive", 1), ("coarse_beams", 0),
+            ("coarse_steps", 1),
         ):  # fmt: skip
             if getattr(self, name) is not None:
                 check_whole(name, getattr(self, name), least)
