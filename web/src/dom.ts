@@ -60,6 +60,11 @@ export function figure(value: number | null | undefined, digits = 2): string {
   return value.toFixed(digits).replace("-", "−");
 }
 
+/** A share in per cent, with a decimal unless it is whole, so that 199 of 200 are not 100 %. */
+export function percent(share: number): string {
+  return String(Math.round(1000 * share) / 10);
+}
+
 export function count(value: number, noun: string, plural = `${noun}s`): string {
   return `${value.toLocaleString("en")} ${value === 1 ? noun : plural}`;
 }

@@ -3,7 +3,7 @@
 import { bitsOf, fetchBlob, fetchFile, fetchRegistries, get, isInSpace, isTurning, maximisesRotation, post, session, type Collection, type Comparison, type ItemState, type Part, type PartFigures, type PartReport, type Point, type Problem, type Registries, ServerError, type ToleranceFound } from "./api";
 import { compareAddress } from "./address";
 import { openTask } from "./begin";
-import { button, clear, count, download, duration, field, figure, h, number, select } from "./dom";
+import { button, clear, count, download, duration, field, figure, h, number, percent, select } from "./dom";
 import { where } from "./drawing";
 import { Player, type Picture } from "./player";
 import { figureTables, FRAMES, itemTable, otherObjective, verdictOf, type Column } from "./specification";
@@ -281,7 +281,7 @@ export class Result {
     const { tolerance: found } = this.known;
     if (!wanted || !found || typeof found === "string" || !found.prints) return null;
     const share = found.met / found.prints;
-    return { ...wanted, reached: `${Math.round(100 * share)} %`, margin: share - this.leastYield, met: share >= this.leastYield };
+    return { ...wanted, reached: `${percent(share)} %`, margin: share - this.leastYield, met: share >= this.leastYield };
   }
 
   /** Part of the random prints that is to meet all items. */
@@ -298,7 +298,7 @@ export class Result {
     const { tolerance } = this.known;
     if (!tolerance) return " Not checked over tolerances.";
     if (tolerance === "running") return " The tolerance is being computed.";
-    return typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} (${Math.round((100 * tolerance.met) / tolerance.prints)} %) ${tolerance.met_words}${tolerance.met < this.leastYield * tolerance.prints ? "; see Tolerance below" : ""}.` : "";
+    return typeof tolerance === "object" && tolerance.prints ? ` Of ${tolerance.prints} random prints, ${tolerance.met} (${percent(tolerance.met / tolerance.prints)} %) ${tolerance.met_words}${tolerance.met < this.leastYield * tolerance.prints ? "; see Tolerance below" : ""}.` : "";
   }
 
   /** Whether nodes and widths are those of a refinement; also of one that was stopped. */
