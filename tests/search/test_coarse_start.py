@@ -50,4 +50,5 @@ def test_symmetric_designs_stay_symmetric() -> None:
     settings = replace(SETTINGS, coarse_beams=50, coarse_steps=250)
     evaluator = make_evaluator(task.problem, settings)
     found = coarse_start(evaluator, settings, 0)
-    assert found is None or np.array_equal(found, evaluator.groups.expand(found))  # type: ignore[attr-defined]
+    assert found is not None
+    assert np.array_equal(found, evaluator.groups.expand(found))  # type: ignore[attr-defined]

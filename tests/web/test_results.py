@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from bellcrank.web import slow_calls
+from bellcrank.web import share_file
 from bellcrank.web.pools import Stopped
 from bellcrank.web.results import Results, StoredResults
-from bellcrank.web.slow_calls import ShareFile
+from bellcrank.web.share_file import ShareFile
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -119,7 +119,7 @@ def test_the_time_left_follows_from_what_is_done_after_the_first_share(
 ) -> None:
     """A mesh of 200 s comes first; each tenth then takes 10 s."""
     clock = iter([0.0, 0.0, 200.0, 210.0, 240.0])
-    monkeypatch.setattr(slow_calls, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    monkeypatch.setattr(share_file, "time", SimpleNamespace(monotonic=lambda: next(clock)))
     path, found = tmp_path / "solid.share", []
     write = ShareFile(str(path))
     for share in (0.1, 0.2, 0.205, 0.5):

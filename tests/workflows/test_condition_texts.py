@@ -3,42 +3,48 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from bellcrank.task import find_task, task_from_dict
 from bellcrank.workflows.condition_texts import condition_texts
 
 if TYPE_CHECKING:
     from bellcrank.model import Problem
+    from bellcrank.task import Task
 
 
-def test_every_load_of_a_task_is_listed() -> None:
-    task = task_from_dict(
+def arm(case: dict[str, Any]) -> Task:
+    """Return the task of a part that is held at its left edge."""
+    return task_from_dict(
         {
             "name": "arm",
             "domain": {"size": ["92 mm", "72 mm"]},
             "supports": [{"at": {"edge": "left"}}],
-            "cases": [
+            "cases": [case],
+        }
+    )
+
+
+def test_every_load_of_a_task_is_listed() -> None:
+    task = arm(
+        {
+            "inputs": [
+                {"at": {"point": [60, 2]}, "direction": "up", "displacement": "3 mm"}
+            ],
+            "outputs": [
                 {
-                    "inputs": [
-                        {"at": {"point": [60, 2]}, "direction": "up", "displacement": "3 mm"}
-                    ],
-                    "outputs": [
-                        {
-                            "at": {"point": [88, 70], "count": 2}, "direction": "up",
-                            "gain": "maximise", "spring": "0.2 N/mm",
-                        }
-                    ],
-                    "loads": [
-                        {
-                            "at": {"point": [88, 70], "count": 2}, "force": "0.05 N",
-                            "direction": "30deg",
-                        },
-                        {"at": {"point": [88, 2]}, "spring": "0.1 N/mm", "direction": "right"},
-                    ],
-                    "gravity": "down",
+                    "at": {"point": [88, 70], "count": 2}, "direction": "up",
+                    "gain": "maximise", "spring": "0.2 N/mm",
                 }
             ],
+            "loads": [
+                {
+                    "at": {"point": [88, 70], "count": 2}, "force": "0.05 N",
+                    "direction": "30deg",
+                },
+                {"at": {"point": [88, 2]}, "spring": "0.1 N/mm", "direction": "right"},
+            ],
+            "gravity": "down",
         }
     )  # fmt: skip
     assert condition_texts(task.problem, task.part) == [
@@ -78,27 +84,20 @@ def test_a_direction_in_space_without_a_name_has_components() -> None:
 
 
 def test_inputs_of_several_directions_and_parts_of_the_stroke_are_texts_of_their_own() -> None:
-    task = task_from_dict(
+    task = arm(
         {
-            "name": "arm",
-            "domain": {"size": ["92 mm", "72 mm"]},
-            "supports": [{"at": {"edge": "left"}}],
-            "cases": [
+            "inputs": [
                 {
-                    "inputs": [
-                        {
-                            "at": {"edge": "bottom", "between": [60, 92]}, "direction": "up",
-                            "displacement": "3 mm", "during": ["0%", "50%"],
-                        },
-                        {
-                            "at": {"point": [88, 70]}, "direction": "left",
-                            "displacement": "3 mm", "during": ["50%", "100%"],
-                        },
-                    ],
-                    "outputs": [
-                        {"at": {"point": [46, 40]}, "direction": "up", "gain": "maximise"}
-                    ],
-                }
+                    "at": {"edge": "bottom", "between": [60, 92]}, "direction": "up",
+                    "displacement": "3 mm", "during": ["0%", "50%"],
+                },
+                {
+                    "at": {"point": [88, 70]}, "direction": "left",
+                    "displacement": "3 mm", "during": ["50%", "100%"],
+                },
+            ],
+            "outputs": [
+                {"at": {"point": [46, 40]}, "direction": "up", "gain": "maximise"}
             ],
         }
     )  # fmt: skip
@@ -109,21 +108,14 @@ def test_inputs_of_several_directions_and_parts_of_the_stroke_are_texts_of_their
 
 
 def test_a_force_is_that_on_all_nodes_of_an_input() -> None:
-    task = task_from_dict(
+    task = arm(
         {
-            "name": "arm",
-            "domain": {"size": ["92 mm", "72 mm"]},
-            "supports": [{"at": {"edge": "left"}}],
-            "cases": [
-                {
-                    "inputs": [
-                        {"at": {"edge": "bottom", "between": [60, 92]}, "direction": "up",
-                         "force": "0.5 N"}
-                    ],
-                    "outputs": [
-                        {"at": {"point": [46, 40]}, "direction": "up", "gain": "maximise"}
-                    ],
-                }
+            "inputs": [
+                {"at": {"edge": "bottom", "between": [60, 92]}, "direction": "up",
+                 "force": "0.5 N"}
+            ],
+            "outputs": [
+                {"at": {"point": [46, 40]}, "direction": "up", "gain": "maximise"}
             ],
         }
     )  # fmt: skip

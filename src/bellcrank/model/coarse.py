@@ -189,10 +189,9 @@ class _Reduction:
     """Reduces a problem to the nodes that chains join."""
 
     def __init__(self, problem: Problem, possible: NDArray[np.bool_], chains: Chains) -> None:
-        from scipy.sparse import csr_matrix
-
         self.problem = problem
         self.chains = chains
+        self.possible = possible
         self.nodes, ends = np.unique(chains.ends, return_inverse=True)
         self.ends = ends.reshape(-1, 2)
         count = problem.lattice.node_count
@@ -200,13 +199,6 @@ class _Reduction:
         self.index[self.nodes] = np.arange(len(self.nodes))
         self.always = problem.initial.copy()
         self.always[problem.designable] = False
-        beams = np.flatnonzero(possible)
-        first, last = problem.lattice.beams[beams].T
-        shape = (count, count)
-        length = csr_matrix((problem.lattice.rest_length[beams], (first, last)), shape=shape)
-        self._length = length + length.T
-        number = csr_matrix((beams + 1, (first, last)), shape=shape)
-        self._number = number + number.T
 
     def coarse(self) -> CoarseProblem:
         problem, chains = self.problem, self.chains
@@ -238,14 +230,22 @@ class _Reduction:
 
     def _region(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the coarse nodes of a region; the nearest ones, with paths to them, if none."""
-        if not len(nodes):
-            return nodes
         own = self.index[nodes]
-        if (own >= 0).any():
+        if not len(nodes) or (own >= 0).any():
             return own[own >= 0]
+        return self._joined(nodes)
+
+    def _joined(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the nearest coarse nodes of a region; designs then have the paths to them."""
+        from scipy.sparse import csr_matrix
         from scipy.sparse.csgraph import dijkstra
 
-        distance, before = dijkstra(self._length, indices=nodes, return_predecessors=True)
+        lattice, beams = self.problem.lattice, np.flatnonzero(self.possible)
+        ends, shape = tuple(lattice.beams[beams].T), (lattice.node_count,) * 2
+        length = csr_matrix((lattice.rest_length[beams], ends), shape=shape)
+        number = csr_matrix((beams, ends), shape=shape)
+        number = number + number.T
+        distance, before = dijkstra(length, directed=False, indices=nodes, return_predecessors=True)
         nearest = self.nodes[distance[:, self.nodes].argmin(axis=1)]
         for row, (node, end) in enumerate(zip(nodes.tolist(), nearest.tolist(), strict=True)):
             here = int(end)
@@ -253,7 +253,7 @@ class _Reduction:
                 previous = int(before[row, here])
                 if previous < 0:
                     raise InvalidProblem(f"node {node} is not joined to the coarse lattice")
-                self.always[self._number[previous, here] - 1] = True
+                self.always[number[previous, here]] = True
                 here = previous
         return np.unique(self.index[nearest])
 

@@ -6,13 +6,13 @@ import asyncio
 import contextlib
 import hashlib
 import json
-import time
 from collections import OrderedDict
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.errors import BellcrankError
 from bellcrank.model.storage import read_text, write_text
 from bellcrank.web.pools import Stopped
+from bellcrank.web.share_file import progress_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine, Hashable
@@ -128,7 +128,7 @@ class StoredResults:
         that it still takes by the estimate of `ShareFile`, None if that is not known or has passed.
         """
         if self._results.is_running(key):
-            return _progress(self._path(key, "share"))
+            return progress_of(self._path(key, "share"))
         found = None if running else self._stored(key)
         return None if found is None else {"result": found}
 
@@ -170,17 +170,3 @@ class StoredResults:
         files = sorted(self._folder.glob("*.json"), key=lambda path: path.stat().st_mtime)
         for path in files[: -self._most]:
             path.unlink(missing_ok=True)
-
-
-def _progress(path: Path) -> dict[str, float | None]:
-    """Return the fraction that a computation has written, the seconds so far, and those left."""
-    try:
-        share, seconds, left = map(float, path.read_text(encoding="ascii").split())
-        since = max(time.time() - path.stat().st_mtime, 0.0)
-    except (OSError, ValueError):
-        return {"share": None, "seconds": None, "left": None}
-    return {
-        "share": share,
-        "seconds": round(seconds + since),
-        "left": round(left - since) if left > since else None,
-    }

@@ -5,10 +5,8 @@ Arguments and results are plain data.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
-import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -23,6 +21,7 @@ from bellcrank.fem.results import finite
 from bellcrank.model import problem_to_dict, write_design
 from bellcrank.web.items import item_states
 from bellcrank.web.quick_calls import design_of
+from bellcrank.web.share_file import ShareFile
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -37,8 +36,6 @@ GIF_SIZE = (720, 404)
 GIF_FPS = 20
 BODIES = {"plane": "sheet", "solid": "solid"}
 """Names of the models of the printed body in which a specification is computed, by level."""
-LEAST_SHARE = 0.01
-"""Smallest change of the fraction of a computation that is written."""
 DRAWN_SAGITTA = 0.05
 """Largest distance of a drawn outline from its arcs, mm."""
 MAX_VERTICES = 60_000
@@ -132,42 +129,6 @@ def _export(design: Design, spec: PartSpec, path: Path, grips: Grips) -> None:
     from bellcrank.workflows.fabricate import bundle_of
 
     export(bundle_of(design, spec, grips, layer=LAYER), path)
-
-
-class ShareFile:
-    """A file with the fraction of a computation that is done, its seconds so far, and those left.
-
-    It is for another process, and written when the computation begins. The time left follows from
-    that between the first fraction above 0 and the present one, since what comes before, such as
-    a mesh, may take longer than the rest; it is nan until then.
-
-    Parameters
-    ----------
-    path
-        Path of the file; empty for none.
-    """
-
-    def __init__(self, path: str) -> None:
-        self._path = path
-        self._written = -LEAST_SHARE
-        self._began = time.monotonic()
-        self._first: tuple[float, float] | None = None
-        self(0.0)
-
-    def __call__(self, share: float) -> None:
-        """Write the fraction, unless it has hardly changed."""
-        if self._path and share - self._written >= LEAST_SHARE:
-            self._written = share
-            seconds, left = time.monotonic() - self._began, math.nan
-            if self._first is not None:
-                done, before = self._first
-                left = (1.0 - share) * (seconds - before) / (share - done)
-            elif share > 0.0:
-                self._first = share, seconds
-            with contextlib.suppress(OSError):
-                Path(self._path).write_text(
-                    f"{share:.3f} {seconds:.1f} {left:.1f}", encoding="ascii"
-                )
 
 
 def part_summary(

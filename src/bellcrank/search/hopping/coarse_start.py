@@ -16,6 +16,7 @@ from bellcrank.model import unpack_mask
 from bellcrank.model.coarse import coarse_problems
 from bellcrank.search.constraints.evaluator import ConstrainedEvaluator
 from bellcrank.search.evaluator import make_evaluator
+from bellcrank.search.hopping.state import HoppingState
 from bellcrank.search.registry import chain_blocks
 from bellcrank.search.specification import SpecificationEvaluator
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from bellcrank.model import Problem
     from bellcrank.search.evaluator import Evaluator
     from bellcrank.search.hopping.settings import HoppingSettings
+    from bellcrank.search.symmetry import SymmetryGroups
 
 STRIDES = (2, 3)
 """Numbers of beams in a chain, of which the first counts that leaves few flips, else the last."""
@@ -75,10 +77,18 @@ def coarse_start(
     return None
 
 
+def _groups(evaluator: Evaluator) -> SymmetryGroups | None:
+    """Return the groups in which beams are flipped; None if each is flipped alone."""
+    if isinstance(evaluator, ConstrainedEvaluator | SpecificationEvaluator):
+        return evaluator.groups
+    return None
+
+
 def _whole(evaluator: Evaluator) -> Problem | None:
     """Return the problem of an evaluator with all designable beams of symmetric designs."""
-    if isinstance(evaluator, ConstrainedEvaluator | SpecificationEvaluator):
-        return replace(evaluator.problem, designable=evaluator.groups.members)
+    groups = _groups(evaluator)
+    if groups is not None:
+        return replace(evaluator.problem, designable=groups.members)
     known = isinstance(evaluator, SpringEvaluator | FrameEvaluator)
     return evaluator.problem if known else None
 
@@ -91,6 +101,7 @@ def _result(
         *_, (state, _) = chain_blocks(evaluator, settings, chain)
     except InvalidSettings:
         return None
-    mask = unpack_mask(state.to_dict()["mask"], evaluator.problem.lattice.beam_count)
-    groups = getattr(evaluator, "groups", None)
+    assert isinstance(state, HoppingState)
+    mask = unpack_mask(state.mask, evaluator.problem.lattice.beam_count)
+    groups = _groups(evaluator)
     return mask if groups is None else groups.expand(mask)

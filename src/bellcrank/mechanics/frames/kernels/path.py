@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 from bellcrank.mechanics.frames.kernels.arrays import POINTS, State
 from bellcrank.mechanics.frames.kernels.assembly import (
-    find_load_rate,
     set_right_side,
     solve_step,
     spread_step,
     stiffness_is_definite,
 )
+from bellcrank.mechanics.frames.kernels.load_rate import find_load_rate
 from bellcrank.mechanics.frames.kernels.newton import newton
 from bellcrank.mechanics.frames.kernels.state import (
     copy_state,
