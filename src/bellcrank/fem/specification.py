@@ -30,7 +30,7 @@ from bellcrank.mechanics.stroke_record import forces_of
 from bellcrank.search.strut_loss import StrutLosses
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -173,7 +173,12 @@ def path_count(problem: Problem, case: str) -> int:
     terms: list[Item | ObjectiveTerm] = [*wanted.items, *wanted.maximise]
     own = [each for each in terms if each.case == case]
     needed = {channel for each in own for channel in channels_of(each.quantity, each.output)}
-    return 1 + sum(channel.name in OWN_PATHS for channel in needed)
+    return _path_count(needed)
+
+
+def _path_count(channels: Iterable[Channel]) -> int:
+    """Return the number of paths that channels need: one for all, and those of their own."""
+    return 1 + sum(channel.name in OWN_PATHS for channel in channels)
 
 
 class _Sheet:
@@ -210,7 +215,7 @@ class _Sheet:
         turned = [channel.output for channel in needed if channel.name == "rotation"]
         if quantities and self.part.dimension == 3:
             needed |= dict.fromkeys(Channel("rotation_vector", output) for output in turned)
-        paths = 1 + sum(channel.name in OWN_PATHS for channel in needed)
+        paths = _path_count(needed)
 
         def share(done: int, load: float) -> None:
             report((done + load) / paths)
