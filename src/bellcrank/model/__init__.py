@@ -40,9 +40,8 @@ from bellcrank.model.lattice import Lattice
 from bellcrank.model.lattices import lattices
 from bellcrank.model.loads import Loads, NodeForce, NodeSpring
 from bellcrank.model.masks import pack_mask, unpack_mask
-from bellcrank.model.plain_data import problem_to_dict
 from bellcrank.model.plane import require_plane
-from bellcrank.model.problem import Design, Problem
+from bellcrank.model.problem import Design, Problem, problem_to_dict
 from bellcrank.model.regions import regions
 from bellcrank.model.schema import problem_from_dict
 from bellcrank.model.section import Elasticity, Section

@@ -13,8 +13,7 @@ from bellcrank.errors import InvalidFile, InvalidProblem, InvalidSettings, Unkno
 from bellcrank.model.builtin import builtin
 from bellcrank.model.masks import unpack_mask
 from bellcrank.model.parsing import Table, parse, read_json, read_table
-from bellcrank.model.plain_data import problem_to_dict
-from bellcrank.model.problem import Design, Problem
+from bellcrank.model.problem import Design, Problem, problem_to_dict
 from bellcrank.model.schema import problem_from_dict
 from bellcrank.model.storage import write_text
 

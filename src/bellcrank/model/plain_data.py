@@ -1,61 +1,17 @@
-"""Problems and their parts as plain data for files and hashes."""
+"""Parts of a problem as plain data for files and hashes."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from bellcrank.model.conditions import ROLLERS
-from bellcrank.model.masks import pack_mask
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from bellcrank.model.conditions import Input, Output, Supports
-    from bellcrank.model.problem import Problem
     from bellcrank.model.specification import Specification
-
-PROBLEM_SCHEMA = "bellcrank/problem/1"
-
-
-def problem_to_dict(problem: Problem) -> dict[str, Any]:
-    """Return a problem in full as plain data (schema ``bellcrank/problem/1``).
-
-    Two problems are equal if and only if their data are equal: `Problem.hash` is computed from
-    them.
-
-    Examples
-    --------
-    >>> from bellcrank.model import find_problem
-    >>> data = problem_to_dict(find_problem("crane"))
-    >>> data["schema"], data["input"]["direction"], len(data["designable"])
-    ('bellcrank/problem/1', [0.0, -1.0], 203)
-    """
-    data: dict[str, Any] = {
-        "schema": PROBLEM_SCHEMA,
-        "name": problem.name,
-        "positions": problem.lattice.positions.tolist(),
-        "beams": problem.lattice.beams.tolist(),
-        "initial": pack_mask(problem.initial),
-        "designable": problem.designable.tolist(),
-        "stiffness": {"bond": problem.stiffness.bond, "angle": problem.stiffness.angle},
-        "supports": supports_data(problem.supports, problem.lattice.dimension),
-        "input": input_data(problem.input),
-        "output": output_data(problem.output),
-        "aggregate": problem.aggregate,
-    }
-    wanted, dimension = problem.specification, problem.lattice.dimension
-    optional = {
-        "objective": problem.objective,
-        "section": problem.section and problem.section.to_dict(),
-        "material": problem.material and asdict(problem.material),
-        "widths": None if problem.widths is None else problem.widths.tolist(),
-        "joints": None if problem.joints is None else problem.joints.tolist(),
-        "loads": problem.loads.to_dict() if problem.loads else None,
-        "specification": wanted and specification_data(wanted, dimension),
-    }
-    return data | {key: value for key, value in optional.items() if value is not None}
 
 
 def supports_data(supports: Supports, dimension: int) -> dict[str, Any]:

@@ -5,20 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bellcrank.errors import InvalidProblem
-from bellcrank.model.arrays import (
-    boolean_mask,
-    check_ids,
-    id_list,
-    locked,
-    real_array,
-    rebuild,
-)
+from bellcrank.model.arrays import boolean_mask, check_ids, id_list, locked, real_array, rebuild
 from bellcrank.model.checks import (
     check_connection,
     check_coordinates,
@@ -33,7 +26,7 @@ from bellcrank.model.checks import (
 from bellcrank.model.conditions import Aggregate, Input, Output, Stiffness, Supports
 from bellcrank.model.loads import Loads
 from bellcrank.model.masks import pack_mask
-from bellcrank.model.plain_data import problem_to_dict
+from bellcrank.model.plain_data import input_data, output_data, specification_data, supports_data
 from bellcrank.model.section import DEFAULT_MATERIAL, Elasticity, Section
 from bellcrank.model.specification import Case, Specification
 from bellcrank.model.stroke_ranges import kinks_of
@@ -44,6 +37,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from bellcrank.model.lattice import Lattice
+
+PROBLEM_SCHEMA = "bellcrank/problem/1"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -356,3 +351,42 @@ class Design:
     def with_mask(self, mask: ArrayLike) -> Design:
         """Return a design with other beams and without efficiency."""
         return replace(self, mask=np.asarray(mask), efficiency=None)
+
+
+def problem_to_dict(problem: Problem) -> dict[str, Any]:
+    """Return a problem in full as plain data (schema ``bellcrank/problem/1``).
+
+    Two problems are equal if and only if their data are equal: `Problem.hash` is computed from
+    them.
+
+    Examples
+    --------
+    >>> from bellcrank.model import find_problem
+    >>> data = problem_to_dict(find_problem("crane"))
+    >>> data["schema"], data["input"]["direction"], len(data["designable"])
+    ('bellcrank/problem/1', [0.0, -1.0], 203)
+    """
+    data: dict[str, Any] = {
+        "schema": PROBLEM_SCHEMA,
+        "name": problem.name,
+        "positions": problem.lattice.positions.tolist(),
+        "beams": problem.lattice.beams.tolist(),
+        "initial": pack_mask(problem.initial),
+        "designable": problem.designable.tolist(),
+        "stiffness": {"bond": problem.stiffness.bond, "angle": problem.stiffness.angle},
+        "supports": supports_data(problem.supports, problem.lattice.dimension),
+        "input": input_data(problem.input),
+        "output": output_data(problem.output),
+        "aggregate": problem.aggregate,
+    }
+    wanted, dimension = problem.specification, problem.lattice.dimension
+    optional = {
+        "objective": problem.objective,
+        "section": problem.section and problem.section.to_dict(),
+        "material": problem.material and asdict(problem.material),
+        "widths": None if problem.widths is None else problem.widths.tolist(),
+        "joints": None if problem.joints is None else problem.joints.tolist(),
+        "loads": problem.loads.to_dict() if problem.loads else None,
+        "specification": wanted and specification_data(wanted, dimension),
+    }
+    return data | {key: value for key, value in optional.items() if value is not None}

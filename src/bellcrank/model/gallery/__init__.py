@@ -27,8 +27,7 @@ from bellcrank.errors import InvalidFile
 from bellcrank.model.builtin import builtin
 from bellcrank.model.masks import unpack_mask
 from bellcrank.model.parsing import Table, parse, read_json
-from bellcrank.model.plain_data import problem_to_dict
-from bellcrank.model.problem import Design, Problem
+from bellcrank.model.problem import Design, Problem, problem_to_dict
 from bellcrank.model.schema import elasticity_of, section_of
 from bellcrank.model.tables import ElasticityTable, SectionTable
 
