@@ -274,6 +274,25 @@ def test_a_weight_acts_before_the_input(page: Any) -> None:
     until(page, lambda: not case()["loads"] and "during" not in case()["inputs"][0])
 
 
+def test_the_own_weight_acts_before_the_input(page: Any) -> None:
+    def case() -> dict[str, Any]:
+        return task(page)["table"]["cases"][0]
+
+    tool(page, "Loads")
+    page.get_by_label("The own weight acts").check()
+    until(page, lambda: case().get("gravity_during") == ["0%", "20%"])
+    assert case()["inputs"][0]["during"] == ["20%", "100%"]
+    until(page, lambda: page.get_by_role("button", name="Design it").is_enabled())
+    page.get_by_text("grows with the input", exact=True).click()
+    until(page, lambda: "gravity_during" not in case())
+    assert case()["gravity"] == "down"
+    assert "during" not in case()["inputs"][0]
+    page.get_by_text("before the input", exact=True).click()
+    until(page, lambda: "during" in case()["inputs"][0])
+    page.get_by_label("The own weight acts").uncheck()
+    until(page, lambda: "gravity" not in case() and "during" not in case()["inputs"][0])
+
+
 def test_a_task_is_scaled_with_all_its_lengths(page: Any) -> None:
     page.get_by_label("or start from").select_option("twist-column")
     until(page, lambda: summary(page, "supports") == "7 nodes")

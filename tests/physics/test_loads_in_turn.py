@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bellcrank.errors import InvalidProblem
 from bellcrank.fem.frame.equations import FrameEquations, part_frame
 from bellcrank.fem.path import PathStatus, follow_path
 from bellcrank.mechanics import (
@@ -97,6 +98,49 @@ def test_a_weight_acts_before_the_input_and_is_held(elements: int | None) -> Non
     assert np.abs(moved(evaluator, 0.6) - moved(together, 0.6)).max() > 0.1 * np.abs(weighed).max()
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_own_weight_acts_in_its_part_of_the_stroke(dimension: int) -> None:
+    section = Section.round(0.1) if dimension == 3 else Section(0.1, 1.0)
+    positions = np.zeros((5, dimension))
+    positions[:, 0] = range(5)
+    weight, down = np.zeros(dimension), np.eye(dimension)[1]
+    weight[1] = -2e-7
+    given = {"section": section, "input": Input([4], down, "force", 1e-9, during=(0.5, 1.0))}
+    own = chain(positions, loads=Loads(weight=weight, weight_during=(0.0, 0.5)), **given)
+    # Half of the weight of a beam acts at each of its ends.
+    share = section.area * weight * np.array([0.5, 1.0, 1.0, 1.0, 0.5])[:, None]
+    forces = (NodeForce(range(1, 5), share[1:], during=(0.0, 0.5)),)
+    pulled = chain(positions, loads=Loads(forces=forces), **given)
+    assert own.kinks == (0.5,)
+    evaluators = [FrameEvaluator(each, "displacement") for each in (own, pulled)]
+    for evaluator in evaluators:
+        assert evaluator.evaluate(own.initial).status is Status.CONVERGED
+    for fraction in (0.25, 0.5, 0.75, 1.0):
+        found, expected = (moved(each, fraction) for each in evaluators)
+        assert np.abs(expected).max() > 1e-3
+        assert found == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_own_weight_before_the_input_of_a_task() -> None:
+    task = hanging(loads=[], gravity="down", gravity_during=["0%", "20%"])
+    loads = task.problem.loads
+    assert loads.weight_during == (0.0, 0.2)
+    assert problem_from_dict(problem_to_dict(task.problem)).hash == task.problem.hash
+    texts = str(condition_texts(task.problem, task.part))
+    assert "own weight down, grows from 0% to 20% of the stroke" in texts
+    before, output = response(task), task.problem.output.nodes
+    together = response(
+        hanging(inputs=[INPUT], loads=[], gravity="down", gravity_during=["0%", "100%"])
+    )
+    assert together.problem.loads.weight_during is None
+    assert moved(before, 1.0) == pytest.approx(moved(together, 1.0), abs=1e-7)
+    assert moved(before, 0.2)[output, 1].max() < 0.0
+    with pytest.raises(InvalidProblem, match=r"gravity_during: expected cases\[0\].gravity"):
+        hanging(gravity_during=["0%", "20%"])
+    with pytest.raises(InvalidProblem, match="weight_during: expected a weight"):
+        Loads(weight_during=(0.0, 0.2))
+
+
 def test_finite_elements_follow_the_same_path() -> None:
     task = hanging()
     part = task.part.of(task.problem.full_design())
@@ -121,6 +165,25 @@ def test_the_load_derivative_has_the_sides_of_a_kink(toward: float) -> None:
     expected = (residuals[1] - residuals[0]) / step
     found = equations.load_derivative(here, 0.2, toward)
     assert found == pytest.approx(expected, abs=1e-4 * np.abs(expected).max())
+
+
+@pytest.mark.slow
+def test_the_sheet_sags_alike() -> None:
+    pytest.importorskip("ngsolve")
+    from bellcrank.fem.continuum.response import solve_plane
+
+    task = hanging(loads=[], gravity="down", gravity_during=["0%", "20%"])
+    problem, part = task.problem, task.part.of(task.problem.full_design())
+    states = {state.load: state for state in solve_plane(part, size=1.0).states}
+    still = replace(
+        problem,
+        input=replace(problem.input, amount=1e-9, during=None),
+        loads=replace(problem.loads, weight_during=None),
+    )
+    alone = solve_plane(task.part.of(still.full_design()), size=1.0).states[-1]
+    sag = alone.motion[problem.output.nodes]
+    assert sag[:, 1].max() < -1e-5
+    assert states[0.2].motion[problem.output.nodes] == pytest.approx(sag, rel=1e-5, abs=1e-8)
 
 
 @pytest.mark.slow

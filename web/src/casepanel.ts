@@ -6,9 +6,10 @@ import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
 import {
   cleaned, directionAt, imagesOf, isSpatial, isTurn, nodesOf, QUANTITIES, regionsOf, sectionsOf, vectorInSpace, vectorOf, withSection, withSections,
-  type Amount, type Bounds, type CaseTable, type InputTable, type LoadTable, type OutputTable, type QuantityName, type Target,
+  type Amount, type Bounds, type CaseTable, type InputTable, type LoadTable, type OutputTable, type QuantityName,
+  type Table, type Target,
 } from "./task";
-import { isWeight, whenActs, withInputsAfterWeights } from "./weights";
+import { actsBefore, rangeOf, withInputsAfterWeights } from "./weights";
 
 type Bound = "at_least" | "at_most" | "value" | "target";
 
@@ -235,23 +236,33 @@ function loadFields(editor: TaskEditor, each: LoadTable, target: Target): HTMLEl
       choice("Kind of load", [["force", "force"], ["spring", "spring"]] as ["force" | "spring", string][], isSpring ? "spring" : "force", (picked) =>
         put(picked === "spring" ? { spring: 0.1, force: undefined, during: undefined } : { force: "10 g", spring: undefined }), `load-${target.index}`)),
     ...(isSpring ? [] : [
-      choice("When it acts", [["with", "grows with the input"], ["before", "before the input"]] as ["with" | "before", string][], isWeight(each) ? "before" : "with", (picked) =>
-        put(whenActs(picked === "before")), `when-${target.index}`),
-      isWeight(each) ? h("p", { class: "note" }, "A weight that hangs on the part before it is pushed: it acts in the first fifth of the stroke, the input moves in the rest. Motions count from the part as drawn.")
+      whenItActs(each.during, (during) => put({ during }), `when-${target.index}`),
+      actsBefore(each.during) ? h("p", { class: "note" }, "A weight that hangs on the part before it is pushed: it acts in the first fifth of the stroke, the input moves in the rest. Motions count from the part as drawn.")
         : rangeFields(editor, target, each.during)]),
   ];
 }
 
-function gravity(editor: TaskEditor): HTMLElement {
-  const given = editor.task.table.cases[editor.loadCase]!.gravity;
-  const box = h("input", { type: "checkbox", checked: given !== undefined, "data-key": "gravity" });
-  box.addEventListener("change", () => changeCase(editor, { gravity: box.checked ? "down" : undefined }));
-  return h("label", { class: "tick" }, box, "The own weight acts, downwards");
+/** A choice of when a load acts: before the input, or with it. */
+function whenItActs(during: LoadTable["during"], put: (during: LoadTable["during"]) => void, key: string): HTMLElement {
+  const names: ["with" | "before", string][] = [["with", "grows with the input"], ["before", "before the input"]];
+  return choice("When it acts", names, actsBefore(during) ? "before" : "with", (picked) => put(rangeOf(picked === "before")), key);
 }
 
-function changeCase(editor: TaskEditor, changes: Partial<CaseTable>): void {
+function gravity(editor: TaskEditor): HTMLElement {
+  const { gravity: given, gravity_during: during } = editor.task.table.cases[editor.loadCase]!;
+  const put = (changes: Partial<CaseTable>): void =>
+    editor.change(withInputsAfterWeights(withCase(editor, changes), editor.loadCase));
+  const box = h("input", { type: "checkbox", checked: given !== undefined, "data-key": "gravity" });
+  box.addEventListener("change", () =>
+    put(box.checked ? { gravity: "down", gravity_during: rangeOf(true) } : { gravity: undefined, gravity_during: undefined }));
+  return h("div", {}, h("label", { class: "tick" }, box, "The own weight acts, downwards"),
+    given !== undefined && whenItActs(during, (range) => put({ gravity_during: range }), "when-gravity"));
+}
+
+/** The table with changes of the shown load case. */
+function withCase(editor: TaskEditor, changes: Partial<CaseTable>): Table {
   const cases = editor.task.table.cases.map((each, k) => (k === editor.loadCase ? cleaned({ ...each, ...changes }) : each));
-  editor.change({ ...editor.task.table, cases });
+  return { ...editor.task.table, cases };
 }
 
 /** Bounds on the input force, and adding or removing load cases. */
@@ -269,8 +280,8 @@ function caseTools(editor: TaskEditor): HTMLElement {
     editor.showCase(0);
   };
   return h("details", { class: "more-case", ...(forces.length || table.cases.length > 1 ? { open: true } : {}) }, h("summary", { "data-key": "case-more" }, "Input force, load cases"),
-    ...forces.map((bounds, index) => itemRow(`case-force-${index}`, "input_force", INPUT_FORCE, bounds, (next) => changeCase(editor, { input_force: replaced(forces, index, next) }))),
-    button("Bound the input force", () => changeCase(editor, { input_force: [...forces, { at_most: INPUT_FORCE.example }] }), "quiet", { "data-key": "add-force" }),
+    ...forces.map((bounds, index) => itemRow(`case-force-${index}`, "input_force", INPUT_FORCE, bounds, (next) => editor.change(withCase(editor, { input_force: replaced(forces, index, next) })))),
+    button("Bound the input force", () => editor.change(withCase(editor, { input_force: [...forces, { at_most: INPUT_FORCE.example }] })), "quiet", { "data-key": "add-force" }),
     table.cases.length > 1 && nameField(editor, own),
     h("div", { class: "buttons" },
       button("Add a load case", addCase, "", { "data-key": "add-case" }),
@@ -278,7 +289,7 @@ function caseTools(editor: TaskEditor): HTMLElement {
 }
 
 function nameField(editor: TaskEditor, own: CaseTable): HTMLElement {
-  return amount("case-name", "Name of the load case", own.name, "", (value) => changeCase(editor, { name: value === undefined ? undefined : String(value) }));
+  return amount("case-name", "Name of the load case", own.name, "", (value) => editor.change(withCase(editor, { name: value === undefined ? undefined : String(value) })));
 }
 
 function outputFields(editor: TaskEditor, each: OutputTable, target: Target): Child[] {

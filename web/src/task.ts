@@ -25,7 +25,7 @@ export type QuantityName = (typeof QUANTITIES)[number];
 export type OutputTable = { name?: string; at?: Region[]; direction?: Direction; spring?: Amount; path?: PathTable } & Partial<Record<QuantityName, Bounds[]>>;
 
 export interface CaseTable {
-  name?: string; supports?: Support[]; inputs?: InputTable[]; loads?: LoadTable[]; gravity?: Direction; outputs?: OutputTable[];
+  name?: string; supports?: Support[]; inputs?: InputTable[]; loads?: LoadTable[]; gravity?: Direction; gravity_during?: [Amount, Amount]; outputs?: OutputTable[];
   input_force?: Bounds[]; strain?: Bounds[];
 }
 export interface Material { name: string; young: number; poisson: number; density?: number; strain_limit?: number; [key: string]: unknown }

@@ -10,19 +10,20 @@ const INPUT: Range = ["20%", "100%"];
 
 const isRange = (given: Range | undefined, wanted: Range): boolean => given !== undefined && String(given) === String(wanted);
 
-/** Whether a load acts before the input. */
-export function isWeight(load: LoadTable): boolean {
-  return isRange(load.during, WEIGHT);
+/** Whether a load with this range acts before the input. */
+export function actsBefore(during: Range | undefined): boolean {
+  return isRange(during, WEIGHT);
 }
 
-/** What makes a load act before the input, or grow with it. */
-export function whenActs(before: boolean): Pick<LoadTable, "during"> {
-  return { during: before ? WEIGHT : undefined };
+/** The range of a load that acts before the input, or grows with it. */
+export function rangeOf(before: boolean): Range | undefined {
+  return before ? WEIGHT : undefined;
 }
 
 /** A table whose inputs move after the weights of a load case, if it has any, else along the whole stroke. */
 export function withInputsAfterWeights(table: Table, loadCase: number): Table {
-  const weighed = (sectionsOf(table, loadCase, "loads") as LoadTable[]).some(isWeight);
+  const ranges = [...(sectionsOf(table, loadCase, "loads") as LoadTable[]).map((each) => each.during), table.cases[loadCase]?.gravity_during];
+  const weighed = ranges.some(actsBefore);
   const inputs = (sectionsOf(table, loadCase, "inputs") as InputTable[]).map((each) =>
     weighed ? { ...each, during: each.during ?? INPUT } : isRange(each.during, INPUT) ? cleaned({ ...each, during: undefined }) : each);
   return withSections(table, loadCase, "inputs", inputs);

@@ -60,8 +60,7 @@ def check_frame_only(
     They need a section, and an input or a load that grows at every fraction of the stroke.
     """
     if section is not None:
-        ranges = [inputs.ranges, *(np.array([each.range]) for each in loads.forces)]
-        check_cover("input.during", np.concatenate(ranges))
+        check_cover("input.during", np.concatenate([inputs.ranges, loads.ranges]))
     elif inputs.during is not None:
         raise InvalidProblem(
             "input.during: expected a problem with a section; in the spring model all inputs move "

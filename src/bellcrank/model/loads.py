@@ -116,12 +116,15 @@ class Loads:
     forces, springs
         Forces on nodes and springs at them.
     weight : (d,) float64
-        Own weight: force on a unit of volume, in proportion to the input; None for none.
+        Own weight: force on a unit of volume; None for none.
+    weight_during
+        Fractions of the stroke between which the own weight grows, as `NodeForce.during`.
 
     Raises
     ------
     InvalidProblem
-        If the weight is not a finite vector.
+        If the weight is not a finite vector, or there is a range of it that is invalid or without
+        a weight.
 
     Examples
     --------
@@ -132,6 +135,7 @@ class Loads:
     forces: tuple[NodeForce, ...] = ()
     springs: tuple[NodeSpring, ...] = ()
     weight: NDArray[np.float64] | None = None
+    weight_during: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "forces", tuple(self.forces))
@@ -143,11 +147,29 @@ class Loads:
                     f"weight: expected a vector of 2 or 3 coordinates, got shape {weight.shape}"
                 )
             object.__setattr__(self, "weight", locked(weight.copy()))
+        if self.weight_during is not None:
+            if self.weight is None:
+                raise InvalidProblem("weight_during: expected a weight, too")
+            during = stroke_range("weight_during", self.weight_during)
+            object.__setattr__(self, "weight_during", None if during == WHOLE else during)
 
     __reduce__ = rebuild
 
     def __bool__(self) -> bool:
         return bool(self.forces or self.springs or self.weight is not None)
+
+    @property
+    def weight_range(self) -> tuple[float, float]:
+        """Fractions of the stroke between which the own weight grows."""
+        return self.weight_during or WHOLE
+
+    @property
+    def ranges(self) -> NDArray[np.float64]:
+        """(r, 2) fractions of the stroke between which forces and own weight grow."""
+        found = [each.range for each in self.forces]
+        if self.weight is not None:
+            found.append(self.weight_range)
+        return np.array(found).reshape(-1, 2)
 
     @property
     def nodes(self) -> NDArray[np.int64]:
@@ -185,4 +207,6 @@ class Loads:
             ]
         if self.weight is not None:
             data["weight"] = self.weight.tolist()
+        if self.weight_during is not None:
+            data["weight_during"] = list(self.weight_during)
         return data

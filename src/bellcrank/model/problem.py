@@ -29,7 +29,7 @@ from bellcrank.model.masks import pack_mask
 from bellcrank.model.plain_data import input_data, output_data, specification_data, supports_data
 from bellcrank.model.section import DEFAULT_MATERIAL, Elasticity, Section
 from bellcrank.model.specification import Case, Specification
-from bellcrank.model.stroke_ranges import kinks_of
+from bellcrank.model.stroke_ranges import WHOLE, kinks_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -225,14 +225,14 @@ class Problem:
     @property
     def has_ranges(self) -> bool:
         """Whether an input or a load grows in a part of the stroke only."""
-        return self.input.during is not None or any(each.during for each in self.loads.forces)
+        return bool((np.concatenate([self.input.ranges, self.loads.ranges]) != WHOLE).any())
 
     @property
     def kinks(self) -> tuple[float, ...]:
         """Fractions within the stroke at which an input or a load starts or stops growing."""
         if not self.has_ranges:
             return ()
-        return kinks_of(np.array([*self.input.ranges, *(each.range for each in self.loads.forces)]))
+        return kinks_of(np.concatenate([self.input.ranges, self.loads.ranges]))
 
     @property
     def special_nodes(self) -> NDArray[np.int64]:

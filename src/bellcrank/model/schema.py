@@ -211,7 +211,7 @@ def _loads(lattice: Lattice, table: LoadsTable, key: str) -> Loads:
         )
         for k, each in enumerate(table.springs)
     ]
-    return Loads(tuple(forces), tuple(springs), table.weight)  # type: ignore[arg-type]
+    return Loads(tuple(forces), tuple(springs), table.weight, table.weight_during)  # type: ignore[arg-type]
 
 
 def _specification(lattice: Lattice, table: SpecificationTable | None) -> Specification | None:

@@ -67,6 +67,7 @@ class LoadsTable(Table):
     forces: list[ForceTable] = Field(default_factory=list)
     springs: list[SpringTable] = Field(default_factory=list)
     weight: list[float] | None = None
+    weight_during: list[Any] | None = None
 
 
 class CaseTable(Table):

@@ -121,8 +121,7 @@ class CaseReader:
         else:
             raise InvalidProblem("supports: expected at least one support of the part")
         push, loads = self._input(case, key), self._loads(case, key)
-        ranges = [push.ranges, *(np.array([each.range]) for each in loads.forces)]
-        check_cover(f"{key}.inputs.during", np.concatenate(ranges))
+        check_cover(f"{key}.inputs.during", np.concatenate([push.ranges, loads.ranges]))
         outputs = self._outputs(case, key, reader)
         reader.read("input_force", case.input_force, f"{key}.input_force")
         reader.read("strain", case.strain, f"{key}.strain")
@@ -233,7 +232,10 @@ class CaseReader:
         weight = None
         if case.gravity is not None:
             weight = self.weight(case.gravity, f"{key}.gravity")
-        return Loads(tuple(forces), tuple(springs), weight)
+        elif case.gravity_during is not None:
+            raise InvalidProblem(f"{key}.gravity_during: expected {key}.gravity, too")
+        during = _range(case.gravity_during, f"{key}.gravity_during")
+        return Loads(tuple(forces), tuple(springs), weight, None if weight is None else during)
 
     def _spring(self, nodes: NDArray[np.int64], section: LoadSection, key: str) -> NodeSpring:
         assert section.spring is not None

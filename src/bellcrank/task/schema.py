@@ -225,7 +225,9 @@ class CaseSection(Table):
     inputs: list[InputSection] = Field(default_factory=list)
     loads: list[LoadSection] = Field(default_factory=list)
     gravity: Direction | None = None
-    """Direction in which the own weight acts; it grows with the input."""
+    """Direction in which the own weight acts."""
+    gravity_during: StrokeRange | None = None
+    """Fractions of the stroke between which the own weight grows."""
     outputs: list[OutputSection] = Field(default_factory=list)
     input_force: Wanted = Field(default_factory=list)
     strain: Wanted = Field(default_factory=list)

@@ -119,7 +119,9 @@ def _load_texts(loads: Loads, units: ProblemUnits, positions: Points) -> list[st
         towards = _direction(spring.direction)
         found.append(f"spring of {size:.3g} N/mm {_at_nodes(spring.nodes, positions)}, {towards}")
     if loads.weight is not None:
-        found.append(f"own weight {_direction(loads.weight)}, grows with the input")
+        during = loads.weight_during
+        when = "with the input" if during is None else _range_text(during)
+        found.append(f"own weight {_direction(loads.weight)}, grows {when}")
     return found
 
 

@@ -129,7 +129,9 @@ class ContinuumEquations:
         boundary = self.system.boundary
         forms = [self._hub_load(boundary.loaded, force) for force in boundary.force]
         if boundary.weight is not None:
-            forms[0] += self._body_force(self.space.TestFunction()[0], boundary.weight)
+            forms[boundary.weight_group] += self._body_force(
+                self.space.TestFunction()[0], boundary.weight
+            )
         rows = []
         for each in forms:
             each.Assemble()

@@ -77,6 +77,8 @@ class Boundary:
         Fractions of the load between which they grow; the first is the whole load.
     weight : (d,) float64, optional
         Own weight at the full load, N / mm^3.
+    weight_group
+        Group of forces with which it grows.
     """
 
     clamped: NDArray[np.int64]
@@ -85,6 +87,7 @@ class Boundary:
     force: NDArray[np.float64]
     force_range: NDArray[np.float64]
     weight: NDArray[np.float64] | None = None
+    weight_group: int = 0
 
 
 def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary:
@@ -134,6 +137,7 @@ def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary
         unit * force[:, loaded],
         force_range,
         None if weight is None else unit / part.scale**3 * weight,
+        force_range.tolist().index(list(problem.loads.weight_range)),
     )
 
 

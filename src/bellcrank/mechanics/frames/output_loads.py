@@ -67,7 +67,7 @@ def with_dead_load(problem: Problem, force: float) -> Problem:
     """Return a problem with a force on its output that acts before the input and during it.
 
     It grows in the first part of the load (`DEAD`), the input and the other forces in the rest; the
-    own weight grows in all of it.
+    own weight grows in all of it unless it has a range of its own.
 
     Parameters
     ----------
@@ -84,14 +84,18 @@ def with_dead_load(problem: Problem, force: float) -> Problem:
     ((0.0, 0.25), [0.25, 1.0])
     """
     dead = replace(resisting_force(problem, force), during=(0.0, DEAD))
-    forces = [
-        replace(each, during=tuple(delayed(np.array([each.range]), DEAD)[0].tolist()))
-        for each in problem.loads.forces
-    ]
+    given = problem.loads
+
+    def later(during: tuple[float, float]) -> tuple[float, float]:
+        begin, end = delayed(np.array([during]), DEAD)[0].tolist()
+        return begin, end
+
+    forces = [replace(each, during=later(each.range)) for each in given.forces]
+    during = None if given.weight_during is None else later(given.weight_during)
     return replace(
         problem,
         input=replace(problem.input, during=delayed(problem.input.ranges, DEAD)),
-        loads=replace(problem.loads, forces=(dead, *forces)),
+        loads=replace(given, forces=(dead, *forces), weight_during=during),
     )
 
 

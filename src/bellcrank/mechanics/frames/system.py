@@ -159,9 +159,12 @@ def prescribed_motion(problem: Problem, nodes: int, size: int) -> tuple[Floats, 
 def applied_forces(problem: Problem, nodes: int, size: int) -> tuple[Floats, Floats]:
     """Return (G, nodes, size) the full forces and (G, 2) the fractions between which they grow.
 
-    Forces with the same range are one group; the first one is that of the whole load.
+    Forces with the same range are one group; the first one is that of the whole load. The own
+    weight has a group, too, even if no other force has its range.
     """
     groups = {WHOLE: np.zeros((nodes, size))}
+    if problem.loads.weight is not None:
+        groups.setdefault(problem.loads.weight_range, np.zeros((nodes, size)))
     axes, given = slice(problem.lattice.dimension), problem.input
     forces = [(each.range, each.nodes, each.force) for each in problem.loads.forces]
     if given.drive == "force":
@@ -259,8 +262,10 @@ def build_frame(
     scale = objective.numerator_scale / (objective.denominator or problem.input.amount)
     sensitivity = abs(scale) * len(problem.output.nodes) * max(1.0, objective.exponent - 1.0)
     of_beam = np.zeros((len(beams), 3))
+    weight_group = 0
     if weight is None:
         weight = problem.loads.weight
+        weight_group = load_range.tolist().index(list(problem.loads.weight_range))
     if weight is not None:
         area = problem.section.area_of(problem.section.width * ratio)
         of_beam[:, :dimension] = (area * length)[:, None] * np.asarray(weight)
@@ -289,6 +294,7 @@ def build_frame(
         load=load,
         load_range=load_range,
         weight=of_beam,
+        weight_group=weight_group,
         has_weight=weight is not None,
         ground=ground,
         spring_nodes=np.flatnonzero(ground.any(axis=(1, 2))),

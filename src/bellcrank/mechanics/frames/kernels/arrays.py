@@ -78,6 +78,8 @@ class Frame(Bundle):
     """(G, 2) fractions of the load between which they grow."""
     weight: Floats
     """(M, 3) force on each beam at full load, one half on either end."""
+    weight_group: int
+    """Group of forces with which the own weight grows."""
     has_weight: bool
     ground: Floats
     """(N, 3, 3) stiffness of springs to the ground."""

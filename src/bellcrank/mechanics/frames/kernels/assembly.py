@@ -87,12 +87,13 @@ def add_loads(
             for j in range(3):
                 gradient[node, i] += frame.ground[node, i, j] * state.u[node, j]
     if frame.has_weight:
+        half = 0.5 * force_share(frame, frame.weight_group, fraction)
         for index in range(structure.sizes[1]):
             beam = structure.beam[index]
             for end in range(2):
                 node = frame.beams[beam, end]
                 for axis in range(dimension(frame)):
-                    gradient[node, axis] -= 0.5 * fraction * frame.weight[beam, axis]
+                    gradient[node, axis] -= half * frame.weight[beam, axis]
 
 
 @kernel

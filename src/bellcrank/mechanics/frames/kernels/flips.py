@@ -33,6 +33,7 @@ from bellcrank.mechanics.frames.kernels.assembly import (
 from bellcrank.mechanics.frames.kernels.beams import axial_force, beam_tangent, dimension
 from bellcrank.mechanics.frames.kernels.factor import couple, entry_of, fill_in
 from bellcrank.mechanics.frames.kernels.response import add_efficiency_gradient, efficiency_of
+from bellcrank.mechanics.frames.kernels.state import force_share
 from bellcrank.mechanics.kernels._compile import entry, kernel
 from bellcrank.mechanics.kernels.fields import clear
 
@@ -237,10 +238,10 @@ def set_right_sides(
     for a in range(2 * size):
         matrix[a, 2 * size] = sign * memory.force[a]
     if frame.has_weight:
+        half = 0.5 * sign * force_share(frame, frame.weight_group, fraction)
         for axis in range(dimension(frame)):
-            half = 0.5 * sign * fraction * frame.weight[beam, axis]
-            matrix[axis, 2 * size] -= half
-            matrix[size + axis, 2 * size] -= half
+            matrix[axis, 2 * size] -= half * frame.weight[beam, axis]
+            matrix[size + axis, 2 * size] -= half * frame.weight[beam, axis]
     for number in range(len(motions)):
         for a in range(2 * size):
             total = 0.0

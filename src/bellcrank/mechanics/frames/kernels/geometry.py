@@ -12,6 +12,7 @@ from bellcrank.mechanics.frames.kernels.beams import (
 )
 from bellcrank.mechanics.frames.kernels.plane import plane_deformations
 from bellcrank.mechanics.frames.kernels.space_angles import add_cross
+from bellcrank.mechanics.frames.kernels.state import force_share
 from bellcrank.mechanics.kernels._compile import entry, kernel
 
 if TYPE_CHECKING:
@@ -272,11 +273,12 @@ def add_weight_products(
     """
     first, second = frame.beams[beam, 0], frame.beams[beam, 1]
     length = frame.rest_length[beam]
+    half = 0.5 * force_share(frame, frame.weight_group, fraction)
     for k in range(len(adjoints)):
         pulled = 0.0
         for axis in range(by_position.shape[2]):
             both = adjoints[k, first, axis] + adjoints[k, second, axis]
-            pulled += 0.5 * fraction * frame.weight[beam, axis] * both
+            pulled += half * frame.weight[beam, axis] * both
         for axis in range(by_position.shape[2]):
             along = pulled * frame.rest[beam, 0, axis] / (length * length)
             by_position[k, second, axis] -= along

@@ -57,13 +57,14 @@ def find_load_rate(
     `within` is a load on the side of the derivative, up to the next kink.
     """
     set_force_rate(frame, structure, within, rate)
+    half = 0.5 * force_rate(frame, frame.weight_group, within)
     for index in range(structure.sizes[1]):
         beam = structure.beam[index]
         first, second = frame.beams[beam, 0], frame.beams[beam, 1]
         if frame.has_weight:
             for axis in range(dimension(frame)):
-                rate[first, axis] -= 0.5 * frame.weight[beam, axis]
-                rate[second, axis] -= 0.5 * frame.weight[beam, axis]
+                rate[first, axis] -= half * frame.weight[beam, axis]
+                rate[second, axis] -= half * frame.weight[beam, axis]
         if not (frame.prescribed[first] or frame.prescribed[second]):
             continue
         add_driven_rate(frame, state, beam, within, rate, memory)
