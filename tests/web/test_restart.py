@@ -181,10 +181,13 @@ def test_a_computation_that_is_stopped_makes_room_for_another(tmp_path: Path) ->
             address = f"{client.base_url}api/tolerance"
             return pool.submit(httpx.post, address, json=asked(width), timeout=300)
 
-        def is_computed(width: float) -> bool:
+        def known(width: float) -> dict[str, Any]:
             body = {**asked(width), "results": False}
-            known = client.post("/api/computations", json=body).json()["tolerance"]
-            return known is not None and known["share"] is not None
+            found = client.post("/api/computations", json=body).json()["tolerance"]
+            return found or {"share": None}
+
+        def is_computed(width: float) -> bool:
+            return known(width)["share"] is not None
 
         def stop(width: float) -> bool:
             body = {**asked(width), "computation": "tolerance"}
@@ -194,6 +197,7 @@ def test_a_computation_that_is_stopped_makes_room_for_another(tmp_path: Path) ->
         first = begin(1.4)
         wait_for(lambda: is_computed(1.4))
         second = begin(1.5)
+        wait_for(lambda: known(1.5).get("waits_for") == "tolerance of crane")
         assert stop(1.4)
         assert first.result(5).status_code == 409
         wait_for(lambda: is_computed(1.5))

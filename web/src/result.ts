@@ -58,7 +58,7 @@ const gripsOf = new Map<string, Grips>();
 /** What was computed of a part. */
 interface Known { fems: Record<string, Fem | "running" | string>; tolerance: ToleranceFound | "running" | string | null; print: Print | "running" | string | null; shares: Record<string, Share | null> }
 /** The share of a computation that is done, seconds since it began, and those left if they can be estimated. */
-interface Share { share: number | null; seconds: number | null; left: number | null }
+interface Share { share: number | null; seconds: number | null; left: number | null; /** The computation before it, in words; empty if that is not known. */ waits_for?: string }
 /** What the server knows of a slow computation: its result, or what is done. */
 type Computation<Found> = { result: Found } | Share | null;
 interface Computations { validation: Record<string, Computation<Fem>>; tolerance: Computation<ToleranceFound>; print: Computation<Print> }
@@ -191,7 +191,7 @@ export class Result {
   private shareText(name: string): string {
     const found = this.known.shares[name];
     if (found === undefined) return " …";
-    if (found === null || found.share === null) return ", waiting for other checks of parts …";
+    if (found === null || found.share === null) return `, waiting for ${found?.waits_for || "other checks of parts"} …`;
     if (found.share === 0 && name !== "tolerance") return `, ${duration(found.seconds)} so far for the mesh and the first state …`;
     const left = found.left === null ? "" : `, about ${duration(found.left)} left`;
     return `, ${Math.round(100 * found.share)} % in ${duration(found.seconds)}${left} …`;

@@ -77,11 +77,13 @@ async def _slow(
 ) -> dict[str, Any]:
     """Return the result of a slow computation on a part, which is also stored in a file."""
     text = json.dumps(body.problem)
+    title = levels[more[0]].title if function is slow_calls.validation else function.__name__
+    name = f"{title} of {body.problem.get('name', 'a part')}".replace("_", " ")
 
     async def compute(share: Path) -> dict[str, Any]:
         further = {"share": str(share)} if function in WITH_SHARE else {}
         call = partial(function, text, body.mask, body.part, *more, **further)
-        return await pool.call(call)
+        return await pool.call_named(name, call)
 
     return await state.stored.get(_slow_key(function, body, *more), compute)
 
@@ -133,10 +135,17 @@ async def get_tolerance(body: PartBody, state: State) -> dict[str, Any]:
 @router.post("/validation")
 async def get_validation(body: FemBody, state: State) -> dict[str, Any]:
     """Return the finite-element analysis of the part of a design."""
-    # Frames take seconds, a body up to an hour: neither waits for checks that take minutes.
-    pools = {"frame": state.pools.files, "solid": state.pools.solids}
-    pool = pools.get(body.level, state.pools.checks)
+    pool = _pool_of(state, body.level)
     return await _slow(state, pool, slow_calls.validation, body, body.level)
+
+
+def _pool_of(state: AppState, level: str) -> Pool:
+    """Return the process of a level: frames and solids do not wait for checks that take minutes.
+
+    Frames take seconds, a solid in space up to an hour.
+    """
+    pools = {"frame": state.pools.files, "solid": state.pools.solids}
+    return pools.get(level, state.pools.checks)
 
 
 @router.post("/computations")
@@ -144,18 +153,26 @@ async def list_computations(body: ComputationsBody, state: State) -> dict[str, A
     """Return what is known of the slow computations on a part; nothing is computed.
 
     Each is null if it was not begun, has its ``result``, or, while it runs, the ``share`` that is
-    done. Without ``results``, only those that run are listed.
+    done; one that waits has what it ``waits_for``, in words. Without ``results``, only those that
+    run or wait are listed.
     """
 
     def read() -> dict[str, Any]:
-        def known(function: Callable[..., dict[str, Any]], *more: Any) -> dict[str, Any] | None:
+        def known(
+            pool: Pool, function: Callable[..., dict[str, Any]], *more: Any
+        ) -> dict[str, Any] | None:
             key = _slow_key(function, body, *more)
-            return state.stored.state(key, running=not body.results)
+            found = state.stored.state(key, running=not body.results)
+            waits = found is not None and found.get("share", 0.0) is None
+            return {**found, "waits_for": pool.running} if found and waits else found
 
         return {
-            "validation": {level: known(slow_calls.validation, level) for level in levels},
-            "tolerance": known(slow_calls.tolerance),
-            "print": known(slow_calls.print_estimate),
+            "validation": {
+                level: known(_pool_of(state, level), slow_calls.validation, level)
+                for level in levels
+            },
+            "tolerance": known(state.pools.checks, slow_calls.tolerance),
+            "print": known(state.pools.files, slow_calls.print_estimate),
         }
 
     return await run_in_threadpool(read)

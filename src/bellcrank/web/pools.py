@@ -96,6 +96,11 @@ class Pool:
     stoppable
         Whether the process is ended when its call is cancelled. Compiled code cannot be
         interrupted in another way.
+
+    Attributes
+    ----------
+    running
+        Name of the running call; empty for none and for one without a name.
     """
 
     def __init__(
@@ -110,6 +115,7 @@ class Pool:
         self.seconds, self.most = seconds, waiting
         self._niceness, self._recycle, self._stoppable = niceness, recycle, stoppable
         self._taken = 0
+        self.running = ""
         self._ended = False
         self._turn = asyncio.Lock()
         self._executor: ProcessPoolExecutor | None = None
@@ -130,7 +136,11 @@ class Pool:
         raise RunFailed("the solver does not start: its process ends at once; is memory short?")
 
     async def call(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Call a function of a module in the process.
+        """Call a function of a module in the process; errors are those of `call_named`."""
+        return await self.call_named("", partial(function, *args, **kwargs))
+
+    async def call_named(self, name: str, function: Callable[[], T]) -> T:
+        """Call a function of a module in the process; its name is in `running` while it runs.
 
         Raises
         ------
@@ -148,7 +158,11 @@ class Pool:
         self._taken += 1
         try:
             async with self._turn:
-                return await self._call(partial(function, *args, **kwargs))
+                self.running = name
+                try:
+                    return await self._call(function)
+                finally:
+                    self.running = ""
         finally:
             self._taken -= 1
 
