@@ -403,7 +403,7 @@ export class Result {
     const first = ["drawn", "95 %", "yield"];
     const worst = head!.map((name, k) => ({ name, k })).filter(({ name }) => ![...first, "item", "wanted"].includes(name));
     clear(this.toleranceBox, h("ul", { class: "plain" }, ...tolerance.sentence.split("; ").map((text) => h("li", {}, sentence(text)))),
-      h("p", { class: "note" }, `95 %: the value that 95 of 100 random prints reach. Yield: the part of the prints that meet an item. Worst values are those for ${tolerance.deviations}, and of the prints.`),
+      h("p", { class: "note" }, `All values are by frames. 95 %: the value that 95 of 100 random prints reach. Yield: the part of the prints that meet an item. Worst values are those for ${tolerance.deviations}, and of the prints. Other deviations can be set in the task, under Limits and tolerance.`),
       h("table", { class: "items tolerance" }, h("caption", {}, "Values as drawn, and in the scenarios"),
         h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "item"), ...first.map((name) => h("th", { scope: "col" }, name)))),
         ...rows.map((row) => h("tbody", {},
