@@ -295,8 +295,9 @@ function nameField(editor: TaskEditor, own: CaseTable): HTMLElement {
 function outputFields(editor: TaskEditor, each: OutputTable, target: Target): Child[] {
   const key = `outputs-${target.index}`;
   const several = sectionsOf(editor.task.table, editor.loadCase, "outputs").length > 1;
-  const usual = (name: QuantityName): Usual => (name === "rotation" && isSpatial(editor.task.table) ? { ...USUAL[name], about: ROTATION_IN_SPACE } : USUAL[name]);
   const turns = isTurn(each);
+  // Of an output that turns, the text is above its items.
+  const usual = (name: QuantityName): Usual => (name === "rotation" && isSpatial(editor.task.table) ? { ...USUAL[name], about: ROTATION_IN_SPACE, isExplained: !turns } : USUAL[name]);
   const rows = QUANTITIES.flatMap((name) => (each[name] ?? []).map((bounds, index) => itemRow(`${key}-${name}-${index}`, name, usual(name), bounds, (next) => set(editor, target, { [name]: replaced(each[name], index, next) }))));
   const options: [string, string][] = [["", "choose …"], ...QUANTITIES.map((name): [string, string] => [name, `${USUAL[name].title}${each[name]?.length ? ", in another range" : ""}`]), ...(each.path || isSpatial(editor.task.table) ? [] : [["path", "path"] as [string, string]])];
   const add = select(options, "", (name) => {

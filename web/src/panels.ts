@@ -162,7 +162,8 @@ export class Panels {
     clear(this.items, h("h2", { class: "plain" }, "Specification"), asked,
       reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by this design.`),
       itemTable(reached ? [{ title: "by hand", items: reached }] : [], wanted),
-      !items.some(({ name }) => name.endsWith("strain")) && h("p", { class: "note" }, editor.task.table.limits?.strain === false ? "The strain is not limited." : "The strain is not limited, since no limit of the material is known: enter one under Limits and tolerance."));
+      !items.some(({ name }) => name.endsWith("strain")) && h("p", { class: "note" }, editor.task.table.limits?.strain === false ? "The strain is not limited." : "The strain is not limited, since no limit of the material is known: enter one under Limits and tolerance."),
+      !items.some(({ name }) => name.endsWith("stable_stroke")) && h("p", { class: "note" }, "The part must be stable up to the full stroke."));
   }
 
   private section(key: string, title: string, summary: string, make: () => HTMLElement): HTMLElement {

@@ -91,7 +91,7 @@ export class RunPage {
     const before = this.run.status;
     this.update = { ...update, moved: update.moved ?? this.update?.moved ?? null };
     this.run = { ...this.run, ...update.run };
-    this.chart.unit = this.unit;
+    this.chart.unit = this.unit.size;
     if (update.refined?.objective != null) this.chart.setRefined(update.refined.objective);
     if (Object.keys(update.points).length || update.reset) this.chart.add(update.points, update.reset);
     this.show(this.run);
@@ -208,7 +208,7 @@ export class RunPage {
     const phases = ["search", "verification", ...(specified ? ["refinement"] : [])];
     const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${count(done, "shape")} computed`)]] : [
       ...(running ? [["phase", `${phases.indexOf(phase) + 1} of ${phases.length}: ${phase}`]] as [string, string][] : []),
-      [!specified ? "best so far" : this.hasObjective ? "largest objective of the search" : "largest margin of the search", this.bestText(run)],
+      [!specified ? "best so far" : this.hasObjective ? "best value of the search" : "largest margin of the search", this.bestText(run)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],
       ...(running && phase === "search" ? [["speed", this.update?.speed ? `${Math.round(this.update.speed).toLocaleString("en")} steps/s` : "starting …"], ["left of this phase", duration(this.update?.left)]] as [string, string][] : []),
       ...(running && tried && !refined ? [["candidates verified", `${tried[0]} of at most ${tried[1]}`]] as [string, string][] : []),
@@ -231,7 +231,7 @@ export class RunPage {
       const moved = this.update?.moved;
       const objective = otherObjective(moved?.objectives ?? []);
       const value = moved?.efficiency ?? run.efficiency ?? this.chart.best;
-      if (objective) this.curveTitle.textContent = `Objective along the search, before refinement: ${objective.label}${this.unit === 1 ? "" : ", mm"}`;
+      if (objective) this.curveTitle.textContent = `Objective along the search, before refinement: ${objective.label}${this.unit.name && `, ${this.unit.name}`}`;
       else if (moved?.objectives.length) this.curveTitle.textContent = `Objective along the search, before refinement: ${moved.objectives[0]!.label}`;
       clear(this.readout, value !== null && h("strong", {}, objective?.reached ?? figure(value, 3)),
         h("span", {}, `${value === null || run.status !== "running" ? "" : `${objective ? objective.label : "output / input motion"} of the `}${this.stateText(run, value !== null, done)}`));
@@ -241,15 +241,17 @@ export class RunPage {
   /** Whether a quantity is maximised; else the smallest margin of the items is. */
   private get hasObjective(): boolean { return Boolean(this.run.problem.specification?.maximise?.length); }
 
-  /** Size of a unit of the objective: mm for a travel. */
-  private get unit(): number {
-    return this.update?.moved?.objectives[0]?.quantity === "travel" ? this.run.part?.scale ?? 1 : 1;
+  /** Name and size of the unit of the objective of a search, where it is of a motion. */
+  private get unit(): { name: string; size: number } {
+    const quantity = this.update?.moved?.objectives[0]?.quantity;
+    if (quantity === "rotation") return { name: "deg", size: 1 };
+    return quantity === "travel" ? { name: "mm", size: this.run.part?.scale ?? 1 } : { name: "", size: 1 };
   }
 
   private bestText(run: Run): string {
     const { best } = this.chart;
     if (!this.run.problem.specification) return figure(run.efficiency ?? best, 3);
-    return best !== null ? figure(best * this.unit, 3) : this.chart.curves.size ? "no design meets all items before refinement" : "–";
+    return best !== null ? `${figure(best * this.unit.size, 3)} ${this.unit.name}`.trim() : this.chart.curves.size ? "no design meets all items before refinement" : "–";
   }
 
   /** Show why a search has no design, and suggestions. */
