@@ -423,6 +423,7 @@ export class Result {
   private lossText({ measure = "efficiency", cost }: ToleranceFound["losses"]): HTMLElement {
     const needed = cost.filter((each) => each === null).length;
     const half = cost.filter((each) => each !== null && each > 0.5).length;
+    if (!needed && !half) return h("p", { class: "note" }, `Without any one of its struts the part reaches the full stroke, with at least half of the ${measure}.`);
     return h("p", { class: "note" }, `Of ${cost.length} struts that are not between two supports, ${needed} are needed to reach the full stroke, and the loss of ${half} others costs more than half of the ${measure}. “Loss of struts” in the drawing colours them.`);
   }
 
@@ -529,7 +530,7 @@ export class Result {
     const found = this.known.fems[level];
     const solid = typeof found === "object" ? found : null;
     if (!report.items.frames?.every(({ met }) => met)) return "This part does not meet its specification.";
-    if (!solid) return `This part is not checked in ${words}.`;
+    if (!solid) return `This part is ${found === "running" ? "being checked" : "not checked"} in ${words}.`;
     return solid.items?.every(({ met }) => met) ? "" : `This part does not meet its specification in ${words}.`;
   }
 
