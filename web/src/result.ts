@@ -58,7 +58,7 @@ const gripsOf = new Map<string, Grips>();
 /** What was computed of a part. */
 interface Known { fems: Record<string, Fem | "running" | string>; tolerance: ToleranceFound | "running" | string | null; print: Print | "running" | string | null; shares: Record<string, Share | null> }
 /** The share of a computation that is done, seconds since it began, and those left if they can be estimated. */
-interface Share { share: number | null; seconds: number | null; left: number | null; /** The computation before it, in words; empty if that is not known. */ waits_for?: string }
+interface Share { share: number | null; seconds: number | null; left: number | null; /** The computation before it, in words; empty if it starts. */ waits_for?: string }
 /** What the server knows of a slow computation: its result, or what is done. */
 type Computation<Found> = { result: Found } | Share | null;
 interface Computations { validation: Record<string, Computation<Fem>>; tolerance: Computation<ToleranceFound>; print: Computation<Print> }
@@ -191,7 +191,7 @@ export class Result {
   private shareText(name: string): string {
     const found = this.known.shares[name];
     if (found === undefined) return " …";
-    if (found === null || found.share === null) return `, waiting for ${found?.waits_for || "other checks of parts"} …`;
+    if (found === null || found.share === null) return found?.waits_for ? `, waiting for ${found.waits_for} …` : ", starting …";
     if (found.share === 0 && name !== "tolerance") return `, ${duration(found.seconds)} so far for the mesh and the first state …`;
     const left = found.left === null ? "" : `, about ${duration(found.left)} left`;
     return `, ${Math.round(100 * found.share)} % in ${duration(found.seconds)}${left} …`;
@@ -416,7 +416,7 @@ export class Result {
   /** The next step where too few random prints meet all items. */
   private toleranceStep({ met, prints }: ToleranceFound): HTMLElement[] {
     if (!this.subject.problem.specification || !prints || met >= this.leastYield * prints) return [];
-    return [h("p", { class: "note" }, "Refine over tolerances moves the nodes of this design and changes its widths until the items are met with deviations, too, where that is possible. The direction of the push deviates in random prints, too."),
+    return [h("p", { class: "note" }, "Refine over tolerances moves the nodes of this design and changes its widths until the items are met with deviations, too, where that is possible. The direction of the push deviates in random prints, too: one that is 5° off moves what it pushes sideways by 9 % of the stroke, which no refinement changes. A wider bound, or smaller deviations, are set in the task."),
       button("Refine over tolerances", () => void this.begin({ refine: true, tolerant: true }), "", { "data-key": "refine-tolerant" })];
   }
 

@@ -79,13 +79,14 @@ async def _slow(
     text = json.dumps(body.problem)
     title = levels[more[0]].title if function is slow_calls.validation else function.__name__
     name = f"{title} of {body.problem.get('name', 'a part')}".replace("_", " ")
+    key = _slow_key(function, body, *more)
 
     async def compute(share: Path) -> dict[str, Any]:
         further = {"share": str(share)} if function in WITH_SHARE else {}
         call = partial(function, text, body.mask, body.part, *more, **further)
-        return await pool.call_named(name, call)
+        return await pool.call_named(key, name, call)
 
-    return await state.stored.get(_slow_key(function, body, *more), compute)
+    return await state.stored.get(key, compute)
 
 
 @router.post("/motion")
@@ -153,8 +154,8 @@ async def list_computations(body: ComputationsBody, state: State) -> dict[str, A
     """Return what is known of the slow computations on a part; nothing is computed.
 
     Each is null if it was not begun, has its ``result``, or, while it runs, the ``share`` that is
-    done; one that waits has what it ``waits_for``, in words. Without ``results``, only those that
-    run or wait are listed.
+    done; one that waits has what it ``waits_for``, in words, which is empty while its own process
+    starts. Without ``results``, only those that run or wait are listed.
     """
 
     def read() -> dict[str, Any]:
@@ -163,8 +164,10 @@ async def list_computations(body: ComputationsBody, state: State) -> dict[str, A
         ) -> dict[str, Any] | None:
             key = _slow_key(function, body, *more)
             found = state.stored.state(key, running=not body.results)
-            waits = found is not None and found.get("share", 0.0) is None
-            return {**found, "waits_for": pool.running} if found and waits else found
+            if found is None or found.get("share", 0.0) is not None:
+                return found
+            running, name = pool.running
+            return {**found, "waits_for": "" if running == key else name or "another computation"}
 
         return {
             "validation": {

@@ -100,7 +100,7 @@ class Pool:
     Attributes
     ----------
     running
-        Name of the running call; empty for none and for one without a name.
+        Key and name of the running call; empty for none and for one without a name.
     """
 
     def __init__(
@@ -115,7 +115,7 @@ class Pool:
         self.seconds, self.most = seconds, waiting
         self._niceness, self._recycle, self._stoppable = niceness, recycle, stoppable
         self._taken = 0
-        self.running = ""
+        self.running = ("", "")
         self._ended = False
         self._turn = asyncio.Lock()
         self._executor: ProcessPoolExecutor | None = None
@@ -137,10 +137,10 @@ class Pool:
 
     async def call(self, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Call a function of a module in the process; errors are those of `call_named`."""
-        return await self.call_named("", partial(function, *args, **kwargs))
+        return await self.call_named("", "", partial(function, *args, **kwargs))
 
-    async def call_named(self, name: str, function: Callable[[], T]) -> T:
-        """Call a function of a module in the process; its name is in `running` while it runs.
+    async def call_named(self, key: str, name: str, function: Callable[[], T]) -> T:
+        """Call a function of a module in the process; `running` has its key and name meanwhile.
 
         Raises
         ------
@@ -158,11 +158,11 @@ class Pool:
         self._taken += 1
         try:
             async with self._turn:
-                self.running = name
+                self.running = key, name
                 try:
                     return await self._call(function)
                 finally:
-                    self.running = ""
+                    self.running = "", ""
         finally:
             self._taken -= 1
 
