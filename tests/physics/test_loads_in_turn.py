@@ -17,7 +17,15 @@ from bellcrank.mechanics import (
     FrameEvaluator,
     Status,
 )
-from bellcrank.model import Input, Loads, NodeForce, Section, problem_from_dict, problem_to_dict
+from bellcrank.model import (
+    Input,
+    Loads,
+    NodeForce,
+    Problem,
+    Section,
+    problem_from_dict,
+    problem_to_dict,
+)
 from bellcrank.task import Task, task_from_dict
 from bellcrank.workflows.condition_texts import condition_texts
 from bellcrank.workflows.loading import loading_path
@@ -51,6 +59,17 @@ def response(task: Task, elements: int | None = None) -> FrameEvaluator:
     found = evaluator.evaluate(task.problem.initial, VERIFICATION_INCREMENT)
     assert found.status is Status.CONVERGED
     return evaluator
+
+
+def without_push(problem: Problem) -> Problem:
+    """Return a problem whose loads grow along the whole stroke of an input that hardly moves."""
+    loads = problem.loads
+    forces = tuple(replace(each, during=None) for each in loads.forces)
+    return replace(
+        problem,
+        input=replace(problem.input, amount=1e-9, during=None),
+        loads=replace(loads, forces=forces, weight_during=None),
+    )
 
 
 def moved(evaluator: FrameEvaluator, fraction: float) -> np.ndarray:
@@ -134,7 +153,12 @@ def test_own_weight_before_the_input_of_a_task() -> None:
     )
     assert together.problem.loads.weight_during is None
     assert moved(before, 1.0) == pytest.approx(moved(together, 1.0), abs=1e-7)
-    assert moved(before, 0.2)[output, 1].max() < 0.0
+    # Before the input moves, all of the weight acts.
+    alone = FrameEvaluator(without_push(task.problem), "displacement")
+    assert alone.evaluate(task.problem.initial, VERIFICATION_INCREMENT).status is Status.CONVERGED
+    sag = moved(alone, 1.0)[output]
+    assert sag[:, 1].max() < -1e-5
+    assert moved(before, 0.2)[output] == pytest.approx(sag, rel=1e-4, abs=1e-7)
     with pytest.raises(InvalidProblem, match=r"gravity_during: expected cases\[0\].gravity"):
         hanging(gravity_during=["0%", "20%"])
     with pytest.raises(InvalidProblem, match="weight_during: expected a weight"):
@@ -175,12 +199,8 @@ def test_the_sheet_sags_alike() -> None:
     task = hanging(loads=[], gravity="down", gravity_during=["0%", "20%"])
     problem, part = task.problem, task.part.of(task.problem.full_design())
     states = {state.load: state for state in solve_plane(part, size=1.0).states}
-    still = replace(
-        problem,
-        input=replace(problem.input, amount=1e-9, during=None),
-        loads=replace(problem.loads, weight_during=None),
-    )
-    alone = solve_plane(task.part.of(still.full_design()), size=1.0).states[-1]
+    still = without_push(problem).full_design()
+    alone = solve_plane(task.part.of(still), size=1.0).states[-1]
     sag = alone.motion[problem.output.nodes]
     assert sag[:, 1].max() < -1e-5
     assert states[0.2].motion[problem.output.nodes] == pytest.approx(sag, rel=1e-5, abs=1e-8)
@@ -197,21 +217,19 @@ def test_the_sheet_hangs_alike() -> None:
     states = {state.load: state for state in solve_plane(part, size=1.0).states}
     weight = states[0.2].force[output].sum(axis=0)
     assert weight == pytest.approx([0.0, -0.04 * 9.80665])
-    # The same sheet without a push, under a force that grows along the whole stroke.
-    (force,) = problem.loads.forces
-    still = replace(
-        problem,
-        input=replace(problem.input, amount=1e-9, during=None),
-        loads=replace(problem.loads, forces=(replace(force, during=None),)),
-    )
-    alone = solve_plane(task.part.of(still.full_design()), size=1.0).states[-1]
+    still = without_push(problem).full_design()
+    alone = solve_plane(task.part.of(still), size=1.0).states[-1]
     assert states[0.2].motion[output] == pytest.approx(alone.motion[output], rel=1e-5, abs=1e-7)
     difference = states[1.0].motion[output] / part.scale - moved(response(task, 8), 1.0)[output]
     assert np.linalg.norm(difference) < 0.05 * problem.input.amount
 
 
-def test_flips_are_predicted_under_a_weight() -> None:
+@pytest.mark.parametrize("own", [False, True])
+def test_flips_are_predicted_under_a_weight(own: bool) -> None:
     problem = hanging().problem
+    if own:  # some 100 times the weight of the material, so that it bends the part
+        loads = Loads(weight=[0.0, -2e-3], weight_during=(0.0, 0.2))
+        problem = replace(problem, loads=loads)
     case = CaseEvaluator(problem)
     channel = Channel("motion", "output")
     fractions = [0.2, 0.6, 1.0]

@@ -95,10 +95,14 @@ def test_joints_have_the_derivatives_of_differences() -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-@pytest.mark.parametrize("kind", ["plane", "plane, joints of the design", "space"])
+@pytest.mark.parametrize("kind", ["plane", "plane, joints of the design", "space", "weight first"])
 def test_channels_have_the_derivatives_of_differences(seed: int, kind: str) -> None:
     design = random_block(seed) if kind == "space" else random_design(seed)
     problem, mask = design.problem, design.mask
+    if kind == "weight first":
+        own = replace(problem.loads, weight=[0.0, -1e-3], weight_during=(0.0, 0.4))
+        later = replace(problem.input, during=(0.4, 1.0))
+        problem = replace(problem, input=later, loads=own)
     own_joints = kind == "plane, joints of the design"
 
     def at(step: float) -> Problem:

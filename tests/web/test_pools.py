@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import os
 import time
+from functools import partial
 
 import pytest
 
@@ -55,6 +56,29 @@ def test_a_cancelled_call_that_waits_leaves_the_one_that_runs() -> None:
             pool.end()
 
     assert asyncio.run(run()) == 499500
+
+
+def test_a_pool_has_the_key_and_name_of_the_call_that_runs() -> None:
+    async def run() -> list[tuple[str, str]]:
+        pool = Pool(seconds=60, waiting=4, stoppable=True)
+        seen = [pool.running]
+        try:
+            first = asyncio.create_task(pool.call_named("1", "check", partial(time.sleep, 50.0)))
+            second = asyncio.create_task(pool.call_named("2", "tolerance", os.getpid))
+            await asyncio.sleep(0.1)
+            seen.append(pool.running)
+            first.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await first
+            await asyncio.sleep(0)
+            seen.append(pool.running)
+            await second
+            seen.append(pool.running)
+        finally:
+            pool.end()
+        return seen
+
+    assert asyncio.run(run()) == [("", ""), ("1", "check"), ("2", "tolerance"), ("", "")]
 
 
 def test_a_pool_refuses_calls_that_are_too_many_and_all_when_it_has_ended() -> None:

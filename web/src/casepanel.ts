@@ -224,7 +224,7 @@ function inputFields(editor: TaskEditor, each: InputTable, target: Target): HTML
   ];
 }
 
-function loadFields(editor: TaskEditor, each: LoadTable, target: Target): HTMLElement[] {
+function loadFields(editor: TaskEditor, each: LoadTable, target: Target): Child[] {
   const isSpring = each.spring !== undefined;
   const put = (changes: Partial<LoadTable>): void =>
     editor.change(withInputsAfterWeights(withSection(editor.task.table, editor.loadCase, target, changes), editor.loadCase));
@@ -236,16 +236,18 @@ function loadFields(editor: TaskEditor, each: LoadTable, target: Target): HTMLEl
       choice("Kind of load", [["force", "force"], ["spring", "spring"]] as ["force" | "spring", string][], isSpring ? "spring" : "force", (picked) =>
         put(picked === "spring" ? { spring: 0.1, force: undefined, during: undefined } : { force: "10 g", spring: undefined }), `load-${target.index}`)),
     ...(isSpring ? [] : [
-      whenItActs(each.during, (during) => put({ during }), `when-${target.index}`),
-      actsBefore(each.during) ? h("p", { class: "note" }, "A weight that hangs on the part before it is pushed: it acts in the first fifth of the stroke, the input moves in the rest. Motions count from the part as drawn.")
-        : rangeFields(editor, target, each.during)]),
+      ...whenItActs(each.during, (during) => put({ during }), `when-${target.index}`),
+      actsBefore(each.during) ? null : rangeFields(editor, target, each.during)]),
   ];
 }
 
-/** A choice of when a load acts: before the input, or with it. */
-function whenItActs(during: LoadTable["during"], put: (during: LoadTable["during"]) => void, key: string): HTMLElement {
+/** A choice of when a load acts, before the input or with it, and what the former means. */
+function whenItActs(during: LoadTable["during"], put: (during: LoadTable["during"]) => void, key: string): Child[] {
   const names: ["with" | "before", string][] = [["with", "grows with the input"], ["before", "before the input"]];
-  return choice("When it acts", names, actsBefore(during) ? "before" : "with", (picked) => put(rangeOf(picked === "before")), key);
+  return [
+    choice("When it acts", names, actsBefore(during) ? "before" : "with", (picked) => put(rangeOf(picked === "before")), key),
+    actsBefore(during) && h("p", { class: "note" }, "A weight that hangs on the part before it is pushed: it acts in the first fifth of the stroke, the input moves in the rest. Motions count from the part as drawn."),
+  ];
 }
 
 function gravity(editor: TaskEditor): HTMLElement {
@@ -256,7 +258,7 @@ function gravity(editor: TaskEditor): HTMLElement {
   box.addEventListener("change", () =>
     put(box.checked ? { gravity: "down", gravity_during: rangeOf(true) } : { gravity: undefined, gravity_during: undefined }));
   return h("div", {}, h("label", { class: "tick" }, box, "The own weight acts, downwards"),
-    given !== undefined && whenItActs(during, (range) => put({ gravity_during: range }), "when-gravity"));
+    ...(given === undefined ? [] : whenItActs(during, (range) => put({ gravity_during: range }), "when-gravity")));
 }
 
 /** The table with changes of the shown load case. */

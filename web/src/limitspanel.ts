@@ -4,6 +4,7 @@ import { h, select } from "./dom";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
 import { cleaned, isSpatial, type Amount, type Limits, type Tolerance } from "./task";
+import { TILTED } from "./text";
 
 const SYMMETRIES: [string, string][] = [["", "none"], ["x", "left and right"], ["y", "up and down"], ["xy", "both"]];
 const SYMMETRIES_IN_SPACE: [string, string][] = [
@@ -62,5 +63,5 @@ function toleranceFields(editor: TaskEditor, tolerance: Tolerance): HTMLElement 
     h("div", { class: "row" }, field("width", "All widths", "", `such as 20%; ${usual("width")}`), field("each_width", "Each width", "", `standard deviation; ${usual("each_width")}`)),
     h("div", { class: "row" }, field("node", "Nodes", "mm", usual("node")), field("angle", "Direction of the input", "°", usual("angle"))),
     h("div", { class: "row" }, field("keep", "Prints keep of the gain", "", "such as 80%; empty: they meet all items"), field("least_yield", "Prints that do so at least", "", usual("least_yield"))),
-    h("p", { class: "note" }, "Widths, nodes and the direction of the input of each random print deviate. A push that is 5° off moves what it pushes sideways by 9 % of the stroke. Without this, the tolerance of a result can be computed all the same."));
+    h("p", { class: "note" }, `Widths, nodes and the direction of the input of each random print deviate. ${TILTED} Without this, the tolerance of a result can be computed all the same.`));
 }

@@ -9,7 +9,7 @@ import { Player, type Picture } from "./player";
 import { figureTables, FRAMES, itemTable, otherObjective, verdictOf, type Column } from "./specification";
 import { strokeCharts } from "./strokechart";
 import type { Table } from "./task";
-import { fileName, REMEDIES, sentence } from "./text";
+import { fileName, REMEDIES, sentence, TILTED } from "./text";
 
 export interface Subject {
   title: string;
@@ -416,14 +416,14 @@ export class Result {
   /** The next step where too few random prints meet all items. */
   private toleranceStep({ met, prints }: ToleranceFound): HTMLElement[] {
     if (!this.subject.problem.specification || !prints || met >= this.leastYield * prints) return [];
-    return [h("p", { class: "note" }, "Refine over tolerances moves the nodes of this design and changes its widths until the items are met with deviations, too, where that is possible. The direction of the push deviates in random prints, too: one that is 5° off moves what it pushes sideways by 9 % of the stroke, which no refinement changes. A wider bound, or smaller deviations, are set in the task."),
+    return [h("p", { class: "note" }, `Refine over tolerances moves the nodes of this design and changes its widths until the items are met with deviations, too, where that is possible. The direction of the push deviates in random prints, too. ${TILTED} No refinement changes that: a wider bound or smaller deviations are set in the task.`),
       button("Refine over tolerances", () => void this.begin({ refine: true, tolerant: true }), "", { "data-key": "refine-tolerant" })];
   }
 
   private lossText({ measure = "efficiency", cost }: ToleranceFound["losses"]): HTMLElement {
     const needed = cost.filter((each) => each === null).length;
     const half = cost.filter((each) => each !== null && each > 0.5).length;
-    if (!needed && !half) return h("p", { class: "note" }, `Without any one of its struts the part reaches the full stroke, with at least half of the ${measure}.`);
+    if (cost.length && !needed && !half) return h("p", { class: "note" }, `Without any one of its struts the part reaches the full stroke, with at least half of the ${measure}.`);
     return h("p", { class: "note" }, `Of ${cost.length} struts that are not between two supports, ${needed} are needed to reach the full stroke, and the loss of ${half} others costs more than half of the ${measure}. “Loss of struts” in the drawing colours them.`);
   }
 

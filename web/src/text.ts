@@ -61,6 +61,9 @@ export const REMEDIES = [
   "Reduce the requirement: less motion of the output, wider bounds, or an output closer to the input.",
 ];
 
+/** Why an input that turns may miss a bound on off-axis motion: sin 5° = 0.087. */
+export const TILTED = "A push that is 5° off moves what it pushes sideways by 9 % of the stroke.";
+
 /** Message of a search without the options of the command line. */
 export function runMessage(message: string): string {
   return sentence(message.replace(/^problem '[^']*': /, "").replaceAll(/ \(--[a-z-]+\)/g, ""));

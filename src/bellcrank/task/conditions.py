@@ -229,13 +229,13 @@ class CaseReader:
                 forces.append(NodeForce(nodes, total / len(nodes) * direction, during))
             else:
                 springs.append(self._spring(nodes, section, where))
-        weight = None
-        if case.gravity is not None:
-            weight = self.weight(case.gravity, f"{key}.gravity")
-        elif case.gravity_during is not None:
-            raise InvalidProblem(f"{key}.gravity_during: expected {key}.gravity, too")
+        if case.gravity is None:
+            if case.gravity_during is not None:
+                raise InvalidProblem(f"{key}.gravity_during: expected {key}.gravity, too")
+            return Loads(tuple(forces), tuple(springs))
+        weight = self.weight(case.gravity, f"{key}.gravity")
         during = _range(case.gravity_during, f"{key}.gravity_during")
-        return Loads(tuple(forces), tuple(springs), weight, None if weight is None else during)
+        return Loads(tuple(forces), tuple(springs), weight, during)
 
     def _spring(self, nodes: NDArray[np.int64], section: LoadSection, key: str) -> NodeSpring:
         assert section.spring is not None

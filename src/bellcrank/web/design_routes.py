@@ -77,8 +77,11 @@ async def _slow(
 ) -> dict[str, Any]:
     """Return the result of a slow computation on a part, which is also stored in a file."""
     text = json.dumps(body.problem)
-    title = levels[more[0]].title if function is slow_calls.validation else function.__name__
-    name = f"{title} of {body.problem.get('name', 'a part')}".replace("_", " ")
+    if function is slow_calls.validation:
+        title = levels[more[0]].title
+    else:
+        title = function.__name__.replace("_", " ")
+    name = f"{title} of {body.problem.get('name', 'a part')}"
     key = _slow_key(function, body, *more)
 
     async def compute(share: Path) -> dict[str, Any]:

@@ -126,7 +126,7 @@ def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary
                 for axis, move in zip(axes, motion, strict=False)
             ]
             means += [MeanConstraint(node, axis) for axis in across]
-    force, force_range = applied_forces(problem, *problem.lattice.positions.shape)
+    force, force_range, weight_group = applied_forces(problem, *problem.lattice.positions.shape)
     loaded = np.intersect1d(np.flatnonzero(force.any(axis=(0, 2))), hubs)
     unit = part.stiffness_unit * part.scale
     weight = problem.loads.weight
@@ -137,7 +137,7 @@ def boundary_of(part: Part, hubs: NDArray[np.int64], dimension: int) -> Boundary
         unit * force[:, loaded],
         force_range,
         None if weight is None else unit / part.scale**3 * weight,
-        force_range.tolist().index(list(problem.loads.weight_range)),
+        weight_group,
     )
 
 

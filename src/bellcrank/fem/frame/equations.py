@@ -119,7 +119,7 @@ def part_frame(part: Part, elements: int = 8, theory: str = "euler-bernoulli") -
     ratio = np.repeat(part.width_ratios, elements)
     elasticity = Elasticity(material.young, material.poisson)
     drive, ramps = prescribed_motion(problem, len(positions), 3)
-    load, load_range = applied_forces(problem, len(positions), 3)
+    load, load_range, _ = applied_forces(problem, len(positions), 3)
     absent = np.ones(len(positions), dtype=bool)
     absent[ends] = False
     there = ~absent[:, None]

@@ -156,15 +156,14 @@ def prescribed_motion(problem: Problem, nodes: int, size: int) -> tuple[Floats, 
     return drive, ramps
 
 
-def applied_forces(problem: Problem, nodes: int, size: int) -> tuple[Floats, Floats]:
-    """Return (G, nodes, size) the full forces and (G, 2) the fractions between which they grow.
+def applied_forces(problem: Problem, nodes: int, size: int) -> tuple[Floats, Floats, int]:
+    """Return (G, nodes, size) the full forces, (G, 2) their ranges, and the group of the weight.
 
-    Forces with the same range are one group; the first one is that of the whole load. The own
-    weight has a group, too, even if no other force has its range.
+    Forces that grow between the same fractions of the load are one group; the first one is that of
+    the whole load. The own weight has a group even if no force has its range.
     """
     groups = {WHOLE: np.zeros((nodes, size))}
-    if problem.loads.weight is not None:
-        groups.setdefault(problem.loads.weight_range, np.zeros((nodes, size)))
+    groups.setdefault(problem.loads.weight_range, np.zeros((nodes, size)))
     axes, given = slice(problem.lattice.dimension), problem.input
     forces = [(each.range, each.nodes, each.force) for each in problem.loads.forces]
     if given.drive == "force":
@@ -173,7 +172,8 @@ def applied_forces(problem: Problem, nodes: int, size: int) -> tuple[Floats, Flo
     for span, at, force in forces:
         group = groups.setdefault(span, np.zeros((nodes, size)))
         group[at, axes] += force
-    return np.array(list(groups.values())), np.array(list(groups))
+    weight_group = list(groups).index(problem.loads.weight_range)
+    return np.array(list(groups.values())), np.array(list(groups)), weight_group
 
 
 def spring_stiffness(problem: Problem, nodes: int) -> Floats:
@@ -218,7 +218,8 @@ def build_frame(
     mask : (M,) bool, optional
         Beams of the lattice that the frame has; all by default.
     weight : (d,), optional
-        Force on a unit of volume; by default that of the problem.
+        Force on a unit of volume, which grows along the whole load; by default that of the
+        problem.
 
     Raises
     ------
@@ -244,7 +245,7 @@ def build_frame(
     held = held_unknowns(problem, nodes, size)
     any_held, all_held = np.asarray(held.any(axis=1)), np.asarray(held.all(axis=1))
     drive, ramps = prescribed_motion(problem, nodes, size)
-    load, load_range = applied_forces(problem, nodes, size)
+    load, load_range, weight_group = applied_forces(problem, nodes, size)
     kinks = problem.kinks
     protected = any_held.astype(np.uint8)
     protected[problem.special_nodes] = 1
@@ -262,10 +263,10 @@ def build_frame(
     scale = objective.numerator_scale / (objective.denominator or problem.input.amount)
     sensitivity = abs(scale) * len(problem.output.nodes) * max(1.0, objective.exponent - 1.0)
     of_beam = np.zeros((len(beams), 3))
-    weight_group = 0
     if weight is None:
         weight = problem.loads.weight
-        weight_group = load_range.tolist().index(list(problem.loads.weight_range))
+    else:
+        weight_group = 0
     if weight is not None:
         area = problem.section.area_of(problem.section.width * ratio)
         of_beam[:, :dimension] = (area * length)[:, None] * np.asarray(weight)
