@@ -282,6 +282,7 @@ def test_the_own_weight_acts_before_the_input(page: Any) -> None:
     page.get_by_label("The own weight acts").check()
     until(page, lambda: case().get("gravity_during") == ["0%", "20%"])
     assert case()["inputs"][0]["during"] == ["20%", "100%"]
+    until(page, lambda: summary(page, "loads") == "own weight")
     until(page, lambda: page.get_by_role("button", name="Design it").is_enabled())
     page.get_by_text("grows with the input", exact=True).click()
     until(page, lambda: "gravity_during" not in case())

@@ -224,7 +224,8 @@ export class Panels {
     const { given } = built.regions;
     let nodes = new Set(nodesOf(built, loadCase, kind).flat()).size;
     if (!nodes && kind !== "loads") nodes = { supports: given.supports, inputs: given.input, outputs: given.output }[kind].length;
-    return nodes ? count(nodes, "node") : "none";
+    const weight = kind === "loads" && this.editor.task.table.cases[loadCase]?.gravity !== undefined && "own weight";
+    return [nodes && count(nodes, "node"), weight].filter(Boolean).join(", ") || "none";
   }
 
   private cases(): HTMLElement {
