@@ -23,7 +23,7 @@ from bellcrank.model.storage import write_text
 from bellcrank.provenance import provenance
 from bellcrank.task import bundled_tasks, find_task
 from benchmarks.page_driving import State, state_task
-from benchmarks.web import running_server
+from benchmarks.web import CHROMIUM, running_server
 
 if TYPE_CHECKING:
     from bellcrank.task import Task
@@ -170,9 +170,8 @@ def main() -> None:
     names = given.names or [*planar_names(), *SPATIAL]
     known = json.loads(RECORD.read_text())["tasks"] if RECORD.exists() else []
     rows = {row["task"]: row for row in known}
-    flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with running_server() as (address, _), sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
+        browser = started.chromium.launch(executable_path=shutil.which("chromium"), args=CHROMIUM)
         for name in names:
             page = browser.new_context(viewport={"width": 1440, "height": 1100}).new_page()
             page.goto(f"{address}/#/draw")

@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 SESSIONS, SEARCHES = 20, 8
-SPACE = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+CHROMIUM = ("--no-sandbox", "--enable-unsafe-swiftshader")
+"""Arguments of Chromium, which draws in space by software. With ``--use-angle=swiftshader`` it
+emulates a graphics processor for the whole page, which takes most of the time of a frame."""
 """Options of Chromium with which it draws a view in space without a graphics processor; pages in
 the plane are slower with them."""
 START_LIMIT = 120.0
@@ -184,7 +186,7 @@ def in_browser(address: str) -> None:
         print("measurements in a browser           skipped: Chromium or playwright is missing")
         return
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=chromium, args=CHROMIUM)
         page = browser.new_page(viewport={"width": 1440, "height": 900})
         received = 0
 
@@ -224,8 +226,9 @@ def in_browser(address: str) -> None:
         frame_time = 1e3 * (thread_time(session) - before) / frames
         print(f"animation of the crane              {rate:.0f} frames per second")
         print(f"time per frame of the page's thread {frame_time:.1f} ms")
+        page.close()
+        in_space(browser, address)
         browser.close()
-        in_space(playwright.chromium.launch(executable_path=chromium, args=SPACE), address)
 
 
 def in_space(browser: Any, address: str) -> None:
@@ -240,7 +243,6 @@ def in_space(browser: Any, address: str) -> None:
     print(f"size of the view in space           {sum(map(int, received)) / 1000:.0f} kB more")
     rate = page.evaluate(COUNT_FRAMES)[1]
     print(f"animation in space, no GPU          {rate:.0f} frames per second")
-    browser.close()
 
 
 def open_crane(page: Any, address: str) -> None:

@@ -75,7 +75,6 @@ def chromium() -> Iterator[Any]:
     arguments = [
         "--no-sandbox",
         "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
-        "--use-angle=swiftshader",
         "--enable-unsafe-swiftshader",  # WebGL without a graphics processor
     ]
     with playwright.sync_playwright() as started:

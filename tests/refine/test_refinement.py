@@ -59,12 +59,11 @@ def test_the_derivatives_of_earlier_steps_are_not_kept() -> None:
     """Over tolerances they took 9 GB."""
     alive = []
 
-    def report(progress: Progress) -> bool:
+    def report(progress: Progress) -> None:
         alive.append(sum(type(each) is Rows for each in gc.get_objects()))
-        return len(alive) < 8
 
-    refine_design(unloaded_crane(), RefinementSettings(steps=20), report)
-    assert len(alive) == 8
+    refine_design(unloaded_crane(), RefinementSettings(steps=7), report)
+    assert len(alive) >= 8
     assert max(alive[3:]) <= max(alive[:3])
 
 
@@ -218,18 +217,6 @@ def test_a_design_that_cannot_be_improved_is_returned_as_it_is(
     assert found.design is design
     assert found.after is found.before
     assert found.reason == "no step improves the design"
-
-
-def test_a_refinement_that_is_stopped_returns_the_best_design() -> None:
-    seen = []
-
-    def report(progress: object) -> bool:
-        seen.append(progress)
-        return len(seen) < 3
-
-    found = refine_design(straight_crane(), RefinementSettings(), report)
-    assert len(seen) == 3
-    assert found.reason == "stopped"
 
 
 def test_nodes_move_no_farther_than_they_may() -> None:

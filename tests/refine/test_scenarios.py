@@ -207,12 +207,17 @@ def test_scenarios_that_a_geometry_misses_are_active_and_those_with_room_are_not
     assert any(-FAR < each.margin < 0.0 for each in outcomes)
     rows = active_rows(design, choice)
     assert not rows.is_reduced
+    met = [each.met for each in outcomes if each.scenario.kind == "print"]
+    assert 0.0 < np.mean(met) < 1.0
+    assert rows.share == np.mean(met)
     active = {each.name for each in choice.chosen}
     assert {each.scenario.name for each in outcomes if each.margin < 0.0} <= active
     assert len(rows.others) == len(active) < len(choice.candidates)
     assert rows.evaluate(np.zeros(rows.variables.count)) is not None
     wider = np.where(rows.variables.moves, 0.0, 0.1)
     assert rows.update(wider) == (True, None)
+    assert choice.tolerances is not None
+    assert rows.share == choice.tolerances.least_yield < 1.0  # all prints meet all items
     # The sag is met with room in all scenarios; those that remain bound the objective.
     moved = replace(design, problem=rows.variables.problem_at(wider))
     objectives = {}
@@ -229,7 +234,9 @@ def test_a_geometry_that_is_far_from_meeting_a_scenario_is_left() -> None:
     rows = active_rows(design, ScenarioChoice(design, 8))
     start = np.zeros(rows.variables.count)
     assert rows.update(start).back is None
+    share = rows.share
     assert rows.update(np.where(rows.variables.moves, 0.0, -0.05)).back is start
+    assert rows.share == share  # that of the geometry to which it goes back
     # A design that is far from meeting all scenarios has no way back.
     design = with_little_sag(0.5)
     choice = ScenarioChoice(design, 8)

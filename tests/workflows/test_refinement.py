@@ -175,7 +175,9 @@ def test_the_geometry_that_is_shown_is_the_nearest_until_one_meets_all_items() -
     ):  # fmt: skip
         rows: Any = SimpleNamespace(violation=violation, objective=objective)
         own = replace(design, efficiency=objective)
-        progress: Any = SimpleNamespace(rows=rows, design=own, evaluations=1, sheets=0)
+        progress: Any = SimpleNamespace(
+            rows=rows, design=own, evaluations=1, sheets=0, share=None
+        )  # fmt: skip
         reporter.add(number, progress)
         shown.append(None if reporter.design is None else reporter.design.efficiency)
         reporter.only_met = False
@@ -193,7 +195,9 @@ def test_the_time_of_a_geometry_is_known_from_the_second_one_on(
     rows: Any = SimpleNamespace(violation=1.0, objective=0.0)
     found = []
     for evaluations in (1, 16):
-        progress: Any = SimpleNamespace(rows=rows, design=None, evaluations=evaluations, sheets=0)
+        progress: Any = SimpleNamespace(
+            rows=rows, design=None, evaluations=evaluations, sheets=0, share=None
+        )
         reporter.add(0, progress)
         summary = reporter.summary()
         assert summary is not None

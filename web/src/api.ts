@@ -170,7 +170,7 @@ export interface RunUpdate {
   speed: number | null;
   left: number | null;
   tried: [number, number] | null;
-  refined: { designs: number; geometries: number; sheets: number; /** Largest number of geometries. */ most: number; /** Mean time of a geometry. */ seconds: number | null; objective: number | null } | null;
+  refined: { designs: number; geometries: number; sheets: number; /** Largest number of geometries. */ most: number; /** Mean time of a geometry. */ seconds: number | null; objective: number | null; /** Part of the random prints that meets all items, at most the wanted one; null without them. */ share: number | null } | null;
   /** The displayed design, with the nodes of its problem if it is refined; null for the one sent before. */
   moved: { mask: string; problem: Problem | null; efficiency: number | null; displacement: number[] | null; items: ItemState[] | null; objectives: Objective[] } | null;
   error?: { message: string };

@@ -6,7 +6,7 @@ import { Chart } from "./chart";
 import { outputTips } from "./marks";
 import { Drawing, markRegions, sectionOf, where, type LatticeDrawing } from "./drawing";
 import { loadSpace } from "./loadspace";
-import { announce, button, choice, clear, count, duration, figure, h } from "./dom";
+import { announce, button, choice, clear, count, duration, figure, h, percent } from "./dom";
 import { Result } from "./result";
 import { itemTable, otherObjective, verdictOf } from "./specification";
 import { runMessage, REMEDIES, sentence, statusName } from "./text";
@@ -206,13 +206,14 @@ export class RunPage {
     const refining = refined && `${count(refined.designs, "design")}, ${refined.geometries.toLocaleString("en")}${bound} shapes${pace}${refined.sheets ? `, ${count(refined.sheets, "check")} ${isInSpace(this.run.problem) ? "with deviations of the print" : "in the 2D solid"}` : ""}`;
     const phase = refined ? "refinement" : tried ? "verification" : "search";
     const phases = ["search", "verification", ...(specified ? ["refinement"] : [])];
-    const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${count(done, "shape")} computed`)]] : [
+    const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${count(done, "shape")} computed`)], ...this.printsRow()] : [
       ...(running ? [["phase", `${phases.indexOf(phase) + 1} of ${phases.length}: ${phase}`]] as [string, string][] : []),
       [!specified ? "best so far" : this.hasObjective ? "best value of the search" : "largest margin of the search", this.bestText(run)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],
       ...(running && phase === "search" ? [["speed", this.update?.speed ? `${Math.round(this.update.speed).toLocaleString("en")} steps/s` : "starting …"], ["left of this phase", duration(this.update?.left)]] as [string, string][] : []),
       ...(running && tried && !refined ? [["candidates verified", `${tried[0]} of at most ${tried[1]}`]] as [string, string][] : []),
       ...(refining ? [["refinement", refining]] as [string, string][] : []),
+      ...this.printsRow(),
       ["method", `${this.method?.title ?? run.method}, ${count(settings.chains, "chain")}, seed ${settings.seed}`],
       ...(settings.goals.length ? [["constraints", settings.goals.join(", ")]] as [string, string][] : []),
     ];
@@ -224,7 +225,9 @@ export class RunPage {
     bar.value = share;
     clear(this.live.querySelector("dl")!, ...rows.flatMap(([name, value]) => [h("dt", {}, name), h("dd", {}, value)]));
     const reached = this.update?.moved?.items;
-    clear(this.items, !this.result && reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by the ${this.update!.moved!.problem ? "best refined design so far" : "best design so far, before refinement"}${reached.every(({ met }) => met) && run.status === "running" ? `; “${run.refine ? TAKE : CHOOSE}” is possible` : ""}.`),
+    const isMet = reached?.every(({ met }) => met);
+    const few = this.missedPrints;
+    clear(this.items, !this.result && reached && h("p", { class: `verdict ${isMet && few === null ? "met" : "missed"}` }, `${verdictOf(reached)} by the ${this.update!.moved!.problem ? "best refined design so far" : "best design so far, before refinement"}${isMet && few !== null ? ` as drawn, but by ${few} % of random prints only` : ""}${isMet && run.status === "running" ? `; “${run.refine ? TAKE : CHOOSE}” is possible` : ""}.`),
       !this.result && reached && itemTable([{ title: "frames", items: reached }]));
     if (run.message && run.status !== "running") this.showMessage(run);
     if (!this.result) {
@@ -236,6 +239,25 @@ export class RunPage {
       clear(this.readout, value !== null && h("strong", {}, objective?.reached ?? figure(value, 3)),
         h("span", {}, `${value === null || run.status !== "running" ? "" : `${objective ? objective.label : "output / input motion"} of the `}${this.stateText(run, value !== null, done)}`));
     }
+  }
+
+  /** Part of the random prints that meets all items, and the part that is needed. */
+  private get prints(): { share: number; needed: number } | null {
+    const share = this.update?.refined?.share ?? null, { tolerances } = this.run.problem.specification ?? {};
+    return share === null || !tolerances ? null : { share, needed: tolerances.least_yield };
+  }
+
+  /** The percentage of random prints that meets all items, if it is less than needed. */
+  private get missedPrints(): string | null {
+    const { prints } = this;
+    return prints && prints.share < prints.needed ? percent(prints.share) : null;
+  }
+
+  private printsRow(): [string, string][] {
+    const { prints } = this;
+    if (!prints) return [];
+    const met = `${prints.share < prints.needed ? "" : "at least "}${percent(prints.share)} %`;
+    return [["random prints", `${met} meet all items with slightly larger deviations than those of the task; ${percent(prints.needed)} % are needed`]];
   }
 
   /** Whether a quantity is maximised; else the smallest margin of the items is. */

@@ -65,8 +65,9 @@ def refine(
     from bellcrank.cli.stopping import stopping_on_interrupt
     from bellcrank.model import write_design
     from bellcrank.refine import RefinementSettings
+    from bellcrank.workflows.file_refinement import FileRefinement
     from bellcrank.workflows.pictures import check_targets, draw_before_and_after
-    from bellcrank.workflows.refinement import motion_rows, refine_file, refinement_rows
+    from bellcrank.workflows.refinement import motion_rows, refinement_rows
     from bellcrank.workflows.tolerance import with_tolerances
     from bellcrank.workflows.validation import spec_for
 
@@ -79,15 +80,15 @@ def refine(
     announce_compilation()
     with stopping_on_interrupt() as stop:
 
-        def report(progress: Progress) -> bool:
+        def report(progress: Progress) -> None:
             if progress.step % 10 == 0 and not progress.reason:
                 notes.print(
                     f"step {progress.step}: objective {progress.rows.objective:.4g}, violation "
                     f"{progress.rows.violation:.3g}"
                 )
-            return not stop.is_set()
 
-        found = refine_file(chosen, settings, report)
+        job = FileRefinement(chosen, settings)
+        found = job.run(report, stop) or job.reached()
     results.print(text_grid(refinement_rows(chosen, found)))
     results.print(text_grid(motion_rows({"before": chosen, "after": found.design})))
     if not found.improved:

@@ -97,17 +97,25 @@ class ActiveRows(ScenarioRows):
         Where it is far from meeting one that was near at the last call, the geometry of that call
         is `Update.back`.
         """
+        before = self.share
         outcomes = self._outcomes(vector)
         far = {id(each.scenario) for each in outcomes if each.margin < -FAR}
         is_back = not far <= self._far and len(far) > self.choice.allowed
-        if not is_back:
+        if is_back:
+            self.share = before
+        else:
             self._far, self._accepted = far, vector
         is_changed = self._choose_near(outcomes, vector)
         return Update(is_changed=is_changed, back=self._accepted if is_back else None)
 
     def _outcomes(self, vector: Values) -> list[Outcome]:
         """Return what a geometry does in each candidate."""
-        return self.choice.outcomes(self.design_at(vector), self.choice.candidates)
+        outcomes = self.choice.outcomes(self.design_at(vector), self.choice.candidates)
+        prints = [each.met for each in outcomes if each.scenario.kind == "print"]
+        if prints:
+            assert self.choice.tolerances is not None
+            self.share = min(sum(prints) / len(prints), self.choice.tolerances.least_yield)
+        return outcomes
 
     def _choose_near(self, outcomes: Sequence[Outcome], vector: Values) -> bool:
         """Choose the scenarios that are near, and lost struts; whether others than before."""

@@ -80,8 +80,6 @@ class FrameRefinement:
         Bound of the lowest stiffness, over its reference, with which it was found.
     payload
         Factor of the payload that one element in each strut has to carry.
-    goes_on
-        Whether the refinement has not been stopped.
     latest
         The progress that was reported last.
     """
@@ -90,7 +88,7 @@ class FrameRefinement:
         self,
         design: Design,
         settings: RefinementSettings,
-        report: Callable[[Progress], bool],
+        report: Callable[[Progress], None],
     ) -> None:
         self.design, self.settings, self.report = design, settings, report
         problem = design.problem
@@ -109,7 +107,6 @@ class FrameRefinement:
         self.payload = 1.0
         self.steps = self.evaluations = 0
         self.reason = "the response of the design is not stable"
-        self.goes_on = True
         self.latest: Progress | None = None
 
     def run(self) -> None:
@@ -133,7 +130,7 @@ class FrameRefinement:
                 self.path, self.stable = path, stable
             is_spent = self.evaluations >= self.settings.evaluations
             is_edge = self.reason == UNSTABLE and not is_spent
-            if not state.items or not self.goes_on or (is_repeated and is_spent):
+            if not state.items or (is_repeated and is_spent):
                 return
             if state.met and is_repeated:
                 continue
@@ -188,13 +185,16 @@ class FrameRefinement:
             vectors.append(progress.vector)
             self.report_progress(progress)
             is_met = progress.rows.violation < MET
-            if not self.goes_on or (is_met and (near or self._is_ample(progress))):
+            if is_met and (near or self._is_ample(progress)):
                 break
         if last is None:
             return None
-        self.reason = last.reason or ("stopped" if not self.goes_on else "all items are met")
+        self.reason = last.reason or "all items are met"
         self.steps, self.evaluations = self.steps + last.step, self.evaluations + last.evaluations
-        state, number = latest_met(self.variables, self.design.mask, vectors)
+        state, number = latest_met(
+            lambda k: state_of(self.variables.problem_at(vectors[k]), self.design.mask),
+            len(vectors),
+        )
         self.tried = vectors[: number + 1]
         state = self._with_robustness(state, vectors[number])
         return state, vectors[number], number == len(vectors) - 1
@@ -206,12 +206,12 @@ class FrameRefinement:
             evaluations=self.evaluations + progress.evaluations,
             design=self._design_at(progress.vector),
         )
-        self.goes_on = self.report(self.latest)
+        self.report(self.latest)
 
     def report_sheet(self, sheets: int) -> None:
         """Report that the sheet is being computed."""
         if self.latest is not None:
-            self.goes_on &= self.report(replace(self.latest, sheets=sheets))
+            self.report(replace(self.latest, sheets=sheets))
 
     def _start(
         self, items: Sequence[Item], stable: float, models: Models, vector: Values

@@ -71,7 +71,7 @@ class SheetRefinement:
             job.chosen, job.best = self._earlier(job.chosen, job.best)
         self._repair()
         is_worse = not job.best.is_near_sheet or job.best.share < job.before.share
-        if job.goes_on and job.before.met and is_worse and job.chosen.any():
+        if job.before.met and is_worse and job.chosen.any():
             start = np.zeros_like(job.chosen)
             given = self._in_sheet(start, job.before)
             if given.is_near_sheet:
@@ -86,7 +86,7 @@ class SheetRefinement:
         models: Models = (NO_DIFFERENCE,)
         stable, missed, earlier = job.stable, math.inf, False
         most = min(SHEETS, max(2, SHEET_CASES // len(job.design.problem.cases)))
-        while job.goes_on and self.sheets < most and state.missed_in_sheet > 0.0:
+        while self.sheets < most and state.missed_in_sheet > 0.0:
             if state.is_on_path_of_sheet:
                 job.payload = 1.0
                 models = job.models(vector, state.records, state.sheet_records)
@@ -114,7 +114,7 @@ class SheetRefinement:
                 self.sheets, missed = self.sheets + 1, total_violation(state.items)
             elif is_same:
                 return
-            elif job.goes_on:
+            else:
                 state = self._in_sheet(vector, state)
                 self._keep_better(vector, state)
 
@@ -133,7 +133,7 @@ class SheetRefinement:
         low, high = 0, len(job.path) - 1
         for _ in range(HALVINGS):
             middle = (low + high) // 2
-            if not job.goes_on or middle == low:
+            if middle == low:
                 break
             found = job.state_at(job.path[middle])
             if not found.met:

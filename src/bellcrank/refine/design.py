@@ -61,7 +61,7 @@ class Refinement:
 def refine_design(
     design: Design,
     settings: RefinementSettings | None = None,
-    report: Callable[[Progress], bool] = lambda _progress: True,
+    report: Callable[[Progress], None] = lambda _progress: None,
     strain_limit: float = math.nan,
     sheet: Sheet | None = None,
 ) -> Refinement:
@@ -79,7 +79,7 @@ def refine_design(
     settings
         Settings of the refinement.
     report
-        Called with each accepted step; the refinement stops if it returns False.
+        Called with each accepted step.
     strain_limit
         Largest strain for a problem without a specification.
     sheet
@@ -104,7 +104,7 @@ def refine_design(
     job = FrameRefinement(given, settings, report)
     job.run()
     sheets = 0
-    if sheet is not None and job.goes_on:
+    if sheet is not None:
         continued = SheetRefinement(job, sheet)
         continued.run()
         sheets = continued.sheets
@@ -112,8 +112,7 @@ def refine_design(
     improved = bool(job.chosen.any())
     if improved:
         at = job.variables.problem_at(job.chosen)
-        moved_problem = problem.with_geometry(at.lattice.positions, at.widths)
-        refined = replace(design, problem=with_joints(moved_problem, design.mask))
+        refined = with_geometry_of(design, at)
     return Refinement(
         design=refined,
         before=job.before,
@@ -124,6 +123,12 @@ def refine_design(
         reason=job.reason,
         improved=improved,
     )
+
+
+def with_geometry_of(design: Design, other: Problem) -> Design:
+    """Return a design with the positions and widths of another problem on the same lattice."""
+    moved = design.problem.with_geometry(other.lattice.positions, other.widths)
+    return replace(design, problem=with_joints(moved, design.mask))
 
 
 def _with_mass(problem: Problem, mask: NDArray[np.bool_]) -> Problem:

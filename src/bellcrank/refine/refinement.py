@@ -99,6 +99,10 @@ class Progress:
         Number of times the sheet has been or is being computed.
     design
         The design with this geometry, where it is known.
+    share
+        Part of the random prints that met all items when all were computed last, at most the
+        wanted yield, with deviations `bellcrank.refine.choice.LARGER` times those that are
+        tolerated; None without prints.
     """
 
     step: int
@@ -109,6 +113,7 @@ class Progress:
     reason: str = ""
     sheets: int = 0
     design: Design | None = None
+    share: float | None = None
 
 
 def refine_rows(
@@ -164,7 +169,10 @@ class _Search:
     def progress(self, reason: str = "") -> Progress:
         """Return the present state."""
         assert self.rows is not None
-        return Progress(self.step, self.evaluations, self.vector, self.rows, self.region, reason)
+        return Progress(
+            self.step, self.evaluations, self.vector, self.rows, self.region, reason,
+            share=self.evaluator.share,
+        )  # fmt: skip
 
     def reason(self) -> str:
         """Return why the refinement ends; empty if it goes on."""

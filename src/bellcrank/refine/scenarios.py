@@ -51,7 +51,14 @@ class ScenarioRows:
         Those of the design as drawn.
     others
         Those of the scenarios.
+
+    Attributes
+    ----------
+    share
+        As that of `bellcrank.refine.refinement.Progress`.
     """
+
+    share: float | None = None
 
     def __init__(self, drawn: RowEvaluator, others: Sequence[Part]) -> None:
         self.drawn, self.variables = drawn, drawn.variables

@@ -15,13 +15,14 @@ from bellcrank.search import HoppingSettings
 from bellcrank.search.verification import Verifier
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
     from numpy.typing import NDArray
 
     from bellcrank.mechanics import ItemResult
     from bellcrank.model import Problem
     from bellcrank.refine.differences import Records
-    from bellcrank.refine.variables import Variables
 
 PRINTABLE = 1e-2
 """Part of the smallest angle or length by which one may be smaller: rounding of the steps."""
@@ -140,21 +141,26 @@ def _prints(problem: Problem, mask: NDArray[np.bool_]) -> bool:
     return True
 
 
-def latest_met(
-    variables: Variables, mask: NDArray[np.bool_], path: list[NDArray[np.float64]]
-) -> tuple[State, int]:
+def latest_met(state_at: Callable[[int], State], count: int) -> tuple[State, int]:
     """Return state and number of the last geometry of a path that meets all with eight elements.
 
     The later ones may be too close to a loss of stability. The last geometry, if none is found
     among a few.
+
+    Parameters
+    ----------
+    state_at
+        Function from the number of a geometry to its state.
+    count
+        Number of geometries.
     """
-    low, high = 0, len(path) - 1
-    found = state_of(variables.problem_at(path[high]), mask), high
+    low, high = 0, count - 1
+    found = state_at(high), high
     if found[0].met:
         return found
     while high - low > 1:
         middle = (low + high) // 2
-        state = state_of(variables.problem_at(path[middle]), mask)
+        state = state_at(middle)
         if state.met:
             low, found = middle, (state, middle)
         else:

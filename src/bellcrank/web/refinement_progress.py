@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING, Any
 
+from bellcrank.refine.reached import Reached
+
 if TYPE_CHECKING:
     from bellcrank.mechanics import Response
     from bellcrank.model import Design, Problem
@@ -39,9 +41,7 @@ class RefinementReporter:
         self.design: Design | None = None
         self.only_met = only_met
         self._part, self._count = part, count
-        self._latest: dict[int, RefinementProgress] = {}
-        self._best: dict[int, RefinementProgress] = {}
-        self._nearest: dict[int, RefinementProgress] = {}
+        self._reached = Reached()
         self._before = 0
         self._sent: Design | None = None
         self._sent_at = 0.0
@@ -49,56 +49,41 @@ class RefinementReporter:
 
     def add(self, number: int, progress: RefinementProgress) -> None:
         """Record a geometry of the refinement of a design."""
-        from bellcrank.refine.by_frames import MET
-
         if self._began is None:
             self._began = time.monotonic()
             self._before = progress.evaluations
-        self._latest[number] = progress
         self._count.add(number, progress.evaluations)
-        if progress.rows.violation > MET:
-            near = self._nearest.get(number)
-            if near is None or progress.rows.violation < near.rows.violation:
-                self._nearest[number] = progress
-        else:
-            best = self._best.get(number)
-            if best is None or progress.rows.objective > best.rows.objective:
-                self._best[number] = progress
-        shown = self.designs() if self._best or not self.only_met else []
+        self._reached.add(number, progress)
+        shown = self.designs() if self._reached.met or not self.only_met else []
         if shown:
             self.design = shown[0]
 
     def designs(self) -> list[Design]:
-        """Return the best design of each refinement, the best first.
-
-        Those that meet all items by their objective, then the others by their violation.
-        """
-        met = sorted(self._best.values(), key=lambda each: -each.rows.objective)
-        near = [each for number, each in self._nearest.items() if number not in self._best]
-        near.sort(key=lambda each: each.rows.violation)
-        return [each.design for each in [*met, *near] if each.design is not None]
+        """Return the best design of each refinement, the best first."""
+        return self._reached.designs()
 
     def summary(self) -> dict[str, Any] | None:
         """Return the numbers of designs, geometries and sheets, and the best objective.
 
         ``seconds`` is the mean time of a geometry since the first one was reported, None before
-        the second. The objective is the largest of geometries that meet all items.
+        the second. The objective is the largest of geometries that meet all items, and ``share``
+        the part of random prints that the displayed one meets, None without prints.
         None before the first geometry.
         """
-        latest = self._latest.values()
+        latest, met = self._reached.latest.values(), self._reached.met
         if not latest:
             return None
         done = self._count.done - self._before
         assert self._began is not None
         passed = time.monotonic() - self._began
-        met = [each.rows.objective for each in self._best.values()]
         return {
             "designs": len(latest),
             "geometries": self._count.done,
             "sheets": sum(each.sheets for each in latest),
             "most": self._count.most,
             "seconds": round(passed / done, 3) if done > 0 else None,
-            "objective": float(max(met)) if met else None,
+            "objective": max((float(each.rows.objective) for each in met), default=None),
+            "share": met[0].share if met else None,
         }
 
     def message(self, design: Design) -> dict[str, Any]:

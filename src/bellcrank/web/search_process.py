@@ -12,6 +12,7 @@ import json
 import os
 import signal
 import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,11 +23,14 @@ from bellcrank.storage.locking import locked
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
+    from bellcrank.model import Design
     from bellcrank.refine.refinement import Progress as RefinementProgress
     from bellcrank.storage import RunFolder
 
 NO_DESIGN_YET = "no admissible design has been found yet; search longer"
 NICENESS = 5
+WRITE_INTERVAL = 2.0
+"""Seconds between two geometries of a refinement that are written, to resume it."""
 
 
 class CommandListener:
@@ -120,42 +124,68 @@ def _search(
 
 
 def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[str, Any]:
-    """Refine the initial design of a job, and write the result as that of a search."""
-    from bellcrank.model import Design, read_problem, write_design
+    """Refine the initial design of a job, and write the result as that of a search.
+
+    One that is resumed begins with the best geometry before.
+    """
+    from bellcrank.model import Design, read_design, read_problem, write_design
     from bellcrank.part import PartSpec
     from bellcrank.refine import RefinementSettings
     from bellcrank.web.refinement_progress import RefinementReporter
-    from bellcrank.workflows.refinement import refine_file
+    from bellcrank.workflows.file_refinement import FileRefinement
     from bellcrank.workflows.refiners import GeometryCount
 
     job = json.loads((where / "job.json").read_text(encoding="utf-8"))
-    problem = read_problem(where / "problem.json")
-    design = Design(problem, problem.initial, provenance={"part": job["part"]})
+    problem, reached = read_problem(where / "problem.json"), where / "reached.json"
+    is_resumed = reached.exists()
+    if is_resumed:
+        design = read_design(reached)
+    else:
+        design = Design(problem, problem.initial, provenance={"part": job["part"]})
     total = job["settings"]["steps"]
+    before = job.get("done", 0) if is_resumed else 0
     part = PartSpec.from_dict(job["part"] or {}, "part")
     reporter = RefinementReporter(part, GeometryCount(most=total), only_met=False)
 
-    def report(progress: RefinementProgress) -> bool:
+    written: Design | None = None
+    written_at = time.monotonic()
+
+    def write_reached(interval: float = 0.0) -> None:
+        """Write the displayed design unless it is known, or was written a short time ago."""
+        nonlocal written, written_at
+        shown = reporter.design
+        if shown is None or shown is written or time.monotonic() - written_at < interval:
+            return
+        write_design(replace(shown, provenance=design.provenance), reached, overwrite=True)
+        written, written_at = shown, time.monotonic()
+
+    def report(progress: RefinementProgress) -> None:
         reporter.add(0, progress)
+        write_reached(WRITE_INTERVAL)
         message = {
             "kind": "progress", "points": {}, "chains": {}, "speed": None, "left": None,
-            "done": progress.evaluations, "total": total, "tried": None,
+            "done": before + progress.evaluations, "total": total, "tried": None,
             "refined": reporter.summary(),
         }  # fmt: skip
         if reporter.design is not None:
             message |= reporter.message(reporter.design)
         with contextlib.suppress(OSError, BrokenPipeError):
             pipe.send(message)
-        return not listener.stop.is_set()
 
-    found = refine_file(design, RefinementSettings(evaluations=total), report)
-    if listener.stop.is_set() and listener.command != "stop":
-        return {"kind": "paused"}
+    left = max(total - before, total // 4)
+    refinement = FileRefinement(design, RefinementSettings(evaluations=left))
+    found = refinement.run(report, listener.stop)
+    kind = "finished"
+    if found is None:
+        if listener.command != "stop":
+            write_reached()
+            return {"kind": "paused"}
+        kind, found = "stopped", refinement.reached()
     result = found.design
     (where / "run").mkdir(exist_ok=True)
     write_design(result, where / "run" / "design.json", overwrite=True)
-    message = "" if found.improved else f"the design was not improved: {found.reason}"
-    kind = "stopped" if listener.stop.is_set() else "finished"
+    is_better = found.improved or is_resumed
+    message = "" if is_better else f"the design was not improved: {found.reason}"
     return {"kind": kind, "message": message, **result_of(where)}
 
 

@@ -1,4 +1,4 @@
-"""Refinement of the selected design of a job, and of a design in a file."""
+"""Refinement of the selected design of a search, and its results as texts."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from bellcrank.fem.results import finite
 from bellcrank.mechanics import VERIFICATION_INCREMENT, FrameEvaluator
 from bellcrank.mechanics.frames.joints import with_joints
 from bellcrank.processes import default_workers
-from bellcrank.provenance import provenance
-from bellcrank.refine import Refinement, RefinementSettings, refine_design
+from bellcrank.refine import Refinement, RefinementSettings
 from bellcrank.search import HoppingSettings, SpecificationEvaluator, specified
 from bellcrank.search.choice import nearest
 from bellcrank.search.selection import Finalist
@@ -20,7 +19,6 @@ from bellcrank.workflows.refiners import (
     FIRST_EVALUATIONS,
     refine_designs,
     second_model,
-    sheet_of,
 )
 from bellcrank.workflows.specification import item_rows
 from bellcrank.workflows.validation import spec_for
@@ -157,11 +155,13 @@ def with_refined(selection: Selection, designs: Sequence[Design]) -> Selection:
     if not designs:
         return selection
     own = _finalist(selection)
-    refined = [_verified(own, design) for design in designs]
-    for chosen in refined:
+    refined = []
+    for design in designs:
+        chosen = _verified(own, design)
         assert chosen.verification is not None
         if chosen.verification.fault is None:
             return _with_finalist(selection, chosen)
+        refined.append(chosen)
     near = nearest([_verified(own, selection.design), *refined])
     is_better = bool(near) and near[0].design is not selection.design
     return _with_finalist(selection, near[0], near) if is_better else selection
@@ -263,34 +263,6 @@ def refinement_text(refinement: Refinement) -> str:
         f"objective {before.objective:.3g} ({met[before.met]}) to {after.objective:.3g} "
         f"({met[after.met]}) in {refinement.steps} steps"
     )
-
-
-def refine_file(
-    design: Design,
-    settings: RefinementSettings,
-    report: Callable[[Progress], bool] = lambda _progress: True,
-) -> Refinement:
-    """Refine a design that is in a file, for the part that its file names.
-
-    Raises
-    ------
-    InvalidSettings
-        As `bellcrank.refine.refine_design`.
-    """
-    spec = spec_for(design)
-    limit = spec.registered_material.strain_limit
-    result = refine_design(design, settings, report, limit, sheet_of(spec, design))
-    if not result.improved:
-        return result
-    notes = {**design.provenance, "refinement": refinement_data(result)}
-    efficiency = (
-        Verifier(result.design.problem, HoppingSettings())
-        .verify(result.design.mask)
-        .response.efficiency
-    )
-    own = provenance(**{key: value for key, value in notes.items() if key not in provenance()})
-    refined = replace(result.design, efficiency=efficiency, provenance=own)
-    return replace(result, design=refined)
 
 
 def motion_rows(designs: Mapping[str, Design]) -> list[list[str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import partial
 from importlib.util import find_spec
@@ -119,45 +120,33 @@ def refine_designs(
     Parameters
     ----------
     designs
-        Designs of frames with a specification.
+        Designs of frames.
     spec
-        Part that is computed in the sheet; None for no sheet.
+        Part that is computed in the sheet, whose material bounds the strain of a problem without a
+        specification; None for no sheet.
     report
         Called with the number of a design and each accepted step, from threads of their own.
     workers
-        Number of designs at a time. Several are refined in processes.
+        Number of designs, and of processes, at a time.
     stop
-        Event that stops all; there are fewer results then.
+        Event that ends all processes at once; there are fewer results then.
     settings
         Settings of each refinement; those of the designs that a search refines further by default.
     """
     if settings is None:
         settings = further_settings(designs[0].problem)
-    workers = min(workers, len(designs))
-    if workers > 1:
-        refined: dict[int, Refinement] = {}
+    refined: dict[int, Refinement] = {}
 
-        def receive(number: int, value: Refinement | Progress) -> None:
-            if isinstance(value, Refinement):
-                refined[number] = value
-            else:
-                report(number, value)
+    def receive(number: int, value: Refinement | Progress) -> None:
+        if isinstance(value, Refinement):
+            refined[number] = value
+        else:
+            report(number, value)
 
-        jobs = [(design, spec, settings) for design in designs]
-        FunctionProcesses(__name__, send_refinement.__name__, jobs, receive).run(workers, stop)
-        return [refined[number] for number in sorted(refined)]
-    results: list[Refinement] = []
-    for number, design in enumerate(designs):
-
-        def step(progress: Progress, number: int = number) -> bool:
-            report(number, progress)
-            return not stop.is_set()
-
-        found = refine_design(design, settings, step, sheet=sheet_of(spec, design))
-        if stop.is_set():
-            break
-        results.append(found)
-    return results
+    jobs = [(design, spec, settings) for design in designs]
+    processes = FunctionProcesses(__name__, send_refinement.__name__, jobs, receive)
+    processes.run(min(workers, len(designs)), stop)
+    return [refined[number] for number in sorted(refined)]
 
 
 def send_refinement(
@@ -168,13 +157,13 @@ def send_refinement(
 ) -> None:
     """Refine a design; send each accepted step without derivatives, then the result."""
 
-    def report(progress: Progress) -> bool:
+    def report(progress: Progress) -> None:
         none = np.zeros((0, 0))
         rows = replace(progress.rows, objective_slopes=none, constraint_slopes=none)
         send(replace(progress, rows=rows))
-        return True
 
-    send(refine_design(design, settings, report, sheet=sheet_of(spec, design)))
+    limit = math.nan if spec is None else spec.registered_material.strain_limit
+    send(refine_design(design, settings, report, limit, sheet_of(spec, design)))
 
 
 def sheet_of(spec: PartSpec | None, design: Design) -> Callable[[Design], Records | None] | None:
