@@ -42,6 +42,8 @@ class State:
         Items of the specification; empty if the response is not stable.
     met
         Whether all of them are met, and the geometry prints.
+    efficiency
+        Efficiency at the full stroke; nan if the response is not stable.
     records
         Channels along the stroke by load case.
     share
@@ -57,6 +59,7 @@ class State:
     objective: float
     items: tuple[ItemResult, ...]
     met: bool
+    efficiency: float = math.nan
     records: Records = field(default_factory=dict)
     share: float = 1.0
     sheet: tuple[ItemResult, ...] = ()
@@ -124,7 +127,7 @@ def state_of(problem: Problem, mask: NDArray[np.bool_]) -> State:
     if found.fault is not None:
         objective = -sum(item.violation for item in found.items)
     met = found.fault is None and _prints(problem, mask)
-    return State(objective, found.items, met, found.records)
+    return State(objective, found.items, met, found.response.efficiency, found.records)
 
 
 def _prints(problem: Problem, mask: NDArray[np.bool_]) -> bool:
@@ -141,7 +144,9 @@ def _prints(problem: Problem, mask: NDArray[np.bool_]) -> bool:
     return True
 
 
-def latest_met(state_at: Callable[[int], State], count: int) -> tuple[State, int]:
+def latest_met(
+    state_at: Callable[[int], State], count: int, halvings: int | None = None
+) -> tuple[State, int]:
     """Return state and number of the last geometry of a path that meets all with eight elements.
 
     The later ones may be too close to a loss of stability. The last geometry, if none is found
@@ -153,12 +158,15 @@ def latest_met(state_at: Callable[[int], State], count: int) -> tuple[State, int
         Function from the number of a geometry to its state.
     count
         Number of geometries.
+    halvings
+        Largest number of times the path is halved; as often as it is possible by default.
     """
-    low, high = 0, count - 1
+    low, high, halved = 0, count - 1, 0
     found = state_at(high), high
     if found[0].met:
         return found
-    while high - low > 1:
+    while high - low > 1 and halved != halvings:
+        halved += 1
         middle = (low + high) // 2
         state = state_at(middle)
         if state.met:

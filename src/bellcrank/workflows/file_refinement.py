@@ -12,8 +12,7 @@ from bellcrank.refine.by_frames import MET
 from bellcrank.refine.design import with_geometry_of
 from bellcrank.refine.reached import share_of
 from bellcrank.refine.state import State, is_better, latest_met, state_of
-from bellcrank.search import HoppingSettings, specified
-from bellcrank.search.verification import Verifier
+from bellcrank.search import specified
 from bellcrank.workflows.refinement import refinement_data
 from bellcrank.workflows.refiners import refine_designs
 from bellcrank.workflows.validation import spec_for
@@ -23,6 +22,11 @@ if TYPE_CHECKING:
 
     from bellcrank.model import Design
     from bellcrank.refine.refinement import Progress
+
+
+HALVINGS = 2
+"""Number of times the path of a stopped refinement is halved to find a geometry that meets all
+items with eight elements."""
 
 
 class FileRefinement:
@@ -103,7 +107,9 @@ class FileRefinement:
             sheets=last.sheets,
         )
         best = max(range(len(self._path)), key=lambda number: _rank(self._path[number], number))
-        after, number = latest_met(lambda k: self._state(self._path[k]), best + 1)
+        is_met = self._path[best].rows.violation <= MET
+        halvings = HALVINGS if is_met else 0
+        after, number = latest_met(lambda k: self._state(self._path[k]), best + 1, halvings)
         if not is_better(after, result.before):
             return replace(result, after=result.before)
         other = self._path[number].design
@@ -121,8 +127,7 @@ class FileRefinement:
             return result
         notes = {**self.design.provenance, "refinement": refinement_data(result)}
         own = provenance(**{key: value for key, value in notes.items() if key not in provenance()})
-        verified = Verifier(result.design.problem, HoppingSettings()).verify(result.design.mask)
-        efficiency = verified.response.efficiency
+        efficiency = result.after.efficiency
         return replace(result, design=replace(result.design, efficiency=efficiency, provenance=own))
 
 
