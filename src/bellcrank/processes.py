@@ -15,6 +15,7 @@ import subprocess
 import sys
 import threading
 import time
+import traceback
 from collections import deque
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -232,6 +233,8 @@ def main(parent: str, module: str, function: str) -> None:
     except (BrokenPipeError, KeyboardInterrupt):
         os._exit(1)  # the parent has ended
     except Exception as error:
+        if not isinstance(error, BellcrankError):
+            traceback.print_exc()
         _write(stream, (type(error).__name__, str(error)))
 
 

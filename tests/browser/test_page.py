@@ -458,8 +458,12 @@ def test_random_prints_are_an_item_of_a_task_over_tolerances(page: Any, server: 
     with page.expect_request("**/api/runs") as asked:
         page.get_by_role("button", name="Refine over tolerances").click()
     assert asked.value.post_data_json["tolerant"]
+    page.wait_for_url("**/#/run/*")  # the movement of a design can be paused, too
+    prints = page.locator(".facts", has_text="random prints")
+    prints.wait_for()
+    assert re.search(r"\d % meet all items .*; 95 % are needed", prints.inner_text())
     page.get_by_role("button", name="Pause").click()
-    page.get_by_role("button", name="Continue").wait_for()
+    page.get_by_role("button", name="Continue").wait_for(timeout=20_000)
 
 
 def test_the_tolerance_of_a_design_is_shown_and_it_is_compared_with_another(

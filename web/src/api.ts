@@ -137,6 +137,8 @@ export interface Run {
   efficiency: number | null;
   /** What the result was to maximise or minimise and its value, if that is not the efficiency. */
   objective: string;
+  /** Whether the result meets all items by frames; null without a result or a specification. */
+  met: boolean | null;
   method: string;
   settings: { steps: number; chains: number; seed: number; goals: string[]; hot?: number; cold?: number; replicas?: number };
   part: Part | null;

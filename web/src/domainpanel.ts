@@ -243,7 +243,7 @@ export class DomainPanel {
       const read = String(value ?? "").split(",").map(Number);
       if (read.length === given.length && read.every(Number.isFinite)) put({ ...shape, [key]: read });
     });
-    return h("div", { class: "row numbers" }, numbers, key === "box" ? null : amount(`zone-${kind}-${index}-radius`, "Radius", shape.radius, "mm", (value) => put({ ...shape, radius: value ?? shape.radius! })));
+    return h("div", { class: `numbers ${key === "box" ? "" : "row"}` }, numbers, key === "box" ? null : amount(`zone-${kind}-${index}-radius`, "Radius", shape.radius, "mm", (value) => put({ ...shape, radius: value ?? shape.radius! })));
   }
 
   private zones(): HTMLElement {

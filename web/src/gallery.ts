@@ -55,7 +55,8 @@ export class RunsPage {
       const active = run.status === "running" || run.status === "queued" || run.status === "paused";
       return h("li", {}, h("a", { class: "line", href: `#/run/${run.id}` },
         h("span", { class: "title" }, run.title),
-        h("span", { class: `status ${run.status}` }, statusText(run, share)),
+        h("span", { class: `status ${run.status}` }, statusText(run, share),
+          run.met !== null && h("b", { class: run.met ? "met" : "missed" }, run.met ? "all items met" : "items missed")),
         h("span", { class: "value" }, run.objective || (run.efficiency === null ? "" : `objective ${figure(run.efficiency)}`)),
         h("span", { class: "more" }, `${run.method}, ${count(run.settings.chains, "chain")} of ${run.settings.steps.toLocaleString("en")} steps, seed ${run.settings.seed} · ${ago(run.created)} · ${run.id.slice(0, 4)}`),
         active && h("progress", { max: 1, value: share, "aria-label": `${run.title}: progress` })));

@@ -99,7 +99,7 @@ export class Panels {
       this.section("limits", "Limits and tolerance", this.limitsSummary(), () => limitsPanel(editor)),
       h("section", { class: "step open specification" }, this.items),
       editor.tool === "hand" && this.hand(),
-      this.searchBox.make());
+      this.searchBox.make(), this.searchBox.makeButton());
     this.showItems();
     this.markFault();
     // What was unfolded stays so.

@@ -193,6 +193,7 @@ export class Result {
     if (found === undefined) return " …";
     if (found === null || found.share === null) return found?.waits_for ? `, waiting for ${found.waits_for} …` : ", starting …";
     if (found.share === 0 && name !== "tolerance") return `, ${duration(found.seconds)} so far for the mesh and the first state …`;
+    if (found.share >= 0.995 && name !== "tolerance") return `, full stroke reached; stress, strain and picture follow, ${duration(found.seconds)} so far …`;
     const left = found.left === null ? "" : `, about ${duration(found.left)} left`;
     return `, ${Math.round(100 * found.share)} % in ${duration(found.seconds)}${left} …`;
   }
@@ -267,7 +268,7 @@ export class Result {
     if (solid?.figures) models.push([title, solid.figures]);
     const conditions = columns.length > 0 && h("p", { class: "note" }, `Items with ${report.conditions.join("; ")}.`);
     this.charts ??= strokeCharts(report.figures, (name) => isTurning(this.subject.problem, name));
-    clear(this.reportBox, columns.length > 0 && itemTable(columns), conditions, ...figureTables(models), this.charts);
+    clear(this.reportBox, columns.length > 0 && itemTable(columns), conditions, ...figureTables(models), models.length > 1 && h("p", { class: "note" }, `–: computed by frames alone, not in ${words}.`), this.charts);
     const better = this.subject.comparison?.efficiency ?? null;
     const defect = unstable ? "The part has no stable path to the full stroke."
       : last && !isMet ? "The specification is not met."
@@ -402,7 +403,7 @@ export class Result {
     // The panel is narrow: the worst values of each item are a line below it.
     const first = ["drawn", "95 %", "yield"];
     const worst = head!.map((name, k) => ({ name, k })).filter(({ name }) => ![...first, "item", "wanted"].includes(name));
-    clear(this.toleranceBox, h("ul", { class: "plain" }, ...tolerance.sentence.split("; ").map((text) => h("li", {}, sentence(text)))),
+    clear(this.toleranceBox, h("ul", { class: "sentences" }, ...tolerance.sentence.split("; ").map((text) => h("li", {}, sentence(text)))),
       h("p", { class: "note" }, `All values are by frames. 95 %: the value that 95 of 100 random prints reach. Yield: the part of the prints that meet an item. Worst values are those for ${tolerance.deviations}, and of the prints. Other deviations can be set in the task, under Limits and tolerance.`),
       h("table", { class: "items tolerance" }, h("caption", {}, "Values as drawn, and in the scenarios"),
         h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "item"), ...first.map((name) => h("th", { scope: "col" }, name)))),

@@ -265,7 +265,7 @@ export class RunPage {
 
   /** Name and size of the unit of the objective of a search, where it is of a motion. */
   private get unit(): { name: string; size: number } {
-    const quantity = this.update?.moved?.objectives[0]?.quantity;
+    const quantity = this.run.problem.specification?.maximise?.[0]?.quantity;
     if (quantity === "rotation") return { name: "deg", size: 1 };
     return quantity === "travel" ? { name: "mm", size: this.run.part?.scale ?? 1 } : { name: "", size: 1 };
   }

@@ -34,7 +34,6 @@ export class SearchBox {
     const effort = EFFORTS.find(([, , steps, chains]) => steps === settings.steps && chains === settings.chains)?.[0] ?? "";
     const method = select(methods.map(({ name, title }) => [name, title]), settings.method, (picked) => update({ method: picked }));
     method.dataset.key = "method";
-    const { missing } = editor;
     return h("section", { class: "step search open" },
       h("h2", { class: "plain" }, "Search"),
       h("div", { class: "content" },
@@ -47,12 +46,18 @@ export class SearchBox {
           h("summary", { "data-key": "more" }, "Method, steps, seed"),
           field("Method", method, "", methods.find(({ name }) => name === settings.method)?.summary ?? ""),
           h("div", { class: "row three" }, whole("steps", "Steps", 1, 2_000_000, "of each chain"), whole("chains", "Chains", 1, 64, "searches side by side"), whole("seed", "Seed", 0, 2 ** 31, "another number, another search"))),
-        editor.hasHandDesign && h("label", { class: "tick" }, this.fromHand(), "Begin with the design by hand"),
-        h("button", { type: "button", class: "primary", "data-key": "begin", disabled: !editor.built?.problem || !!editor.fault || !settings.method || this.busy,
-          onclick: () => void this.start() }, "Design it"),
-        missing && h("p", { class: "note" }, "Supports, an input and an output are needed."),
-        editor.fault && h("p", { class: "fault" }, editor.fault.text),
-        this.fault && h("p", { class: "fault", role: "alert" }, this.fault)));
+        editor.hasHandDesign && h("label", { class: "tick" }, this.fromHand(), "Begin with the design by hand")));
+  }
+
+  /** The button that starts the search, which stays in view below the panel. */
+  makeButton(): HTMLElement {
+    const { editor } = this;
+    return h("div", { class: "start-search" },
+      h("button", { type: "button", class: "primary", "data-key": "begin", disabled: !editor.built?.problem || !!editor.fault || !editor.settings.method || this.busy,
+        onclick: () => void this.start() }, "Design it"),
+      editor.missing && h("p", { class: "note" }, "Supports, an input and an output are needed."),
+      editor.fault && h("p", { class: "fault" }, editor.fault.text),
+      this.fault && h("p", { class: "fault", role: "alert" }, this.fault));
   }
 
   private fromHand(): HTMLInputElement {

@@ -12,14 +12,12 @@ from rich.progress import TextColumn, TimeRemainingColumn
 from bellcrank.cli.live import Live
 from bellcrank.search import Progress as Step
 from bellcrank.search import SearchSettings
+from bellcrank.search.scores import LEAST_MET
 
 if TYPE_CHECKING:
     from bellcrank.model import Problem
     from bellcrank.refine.refinement import Progress as RefinementStep
     from bellcrank.workflows.refiners import GeometryCount
-
-VIOLATED = -50.0
-"""Score below which a design violates goals."""
 
 
 class SearchProgress(Live):
@@ -90,7 +88,7 @@ class SearchProgress(Live):
     def _figures(self) -> str:
         speed = self._made / max(time.monotonic() - self._start, 1e-9)
         temperature = f"T {self._temperature:.4f}  " if self._temperature > 0.0 else ""
-        best = f"best {self._best:6.3f}" if self._best > VIOLATED else "goals not satisfied yet"
+        best = f"best {self._best:6.3f}" if self._best > LEAST_MET else "goals not satisfied yet"
         return (
             f"{best}  {temperature}"
             f"accepted {100.0 * self._accepted / self._made:2.0f} %  {speed:6.0f} steps/s"

@@ -98,6 +98,8 @@ QUANTITIES: dict[str, QuantityType] = {
 """Quantities that items may bound, by name."""
 CARRIED = ("payload", "dead_load")
 """Those that are forces on an output, extrapolated from the motion under the wanted one."""
+ONLY_BOUNDED = ("path_error", "clearance", "stable_stroke", "strut_loss", "mass")
+"""Those that are no objectives."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -225,6 +227,8 @@ class ObjectiveTerm:
             raise InvalidProblem(
                 f"maximise: unknown quantity {self.quantity!r}; known: {', '.join(QUANTITIES)}"
             )
+        if self.quantity in ONLY_BOUNDED:
+            raise InvalidProblem(f"maximise: {self.quantity}: expected a bound, not an objective")
         if not math.isfinite(self.scale) or self.scale == 0.0:
             raise InvalidProblem(
                 f"maximise: {self.quantity}.scale: expected a finite number other than 0, got "

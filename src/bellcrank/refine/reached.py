@@ -46,11 +46,15 @@ class Reached:
         """
         return sorted(self._best.values(), key=_rank, reverse=True)
 
+    @property
+    def best(self) -> list[Progress]:
+        """The best geometry of each refinement, the best first."""
+        near = [each for number, each in self._nearest.items() if number not in self._best]
+        return [*self.met, *sorted(near, key=_nearness, reverse=True)]
+
     def designs(self) -> list[Design]:
         """Return the best design of each refinement, the best first."""
-        near = [each for number, each in self._nearest.items() if number not in self._best]
-        near.sort(key=_nearness, reverse=True)
-        return [each.design for each in [*self.met, *near] if each.design is not None]
+        return [each.design for each in self.best if each.design is not None]
 
 
 def share_of(progress: Progress) -> float:

@@ -1,4 +1,4 @@
-"""Efficiency against step, one curve for each chain, reduced for drawing."""
+"""Scores against step, one curve for each chain, reduced for drawing."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bellcrank.mechanics import Status
 from bellcrank.search import BLOCK, read_settings, searches
+from bellcrank.search.scores import LEAST_MET, SCORE_COLUMNS, recorded_scores
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from bellcrank.storage import RunFolder
 
 Point = tuple[int, float | None, float | None, float]
-"""Step; efficiency of the current and of the best design; temperature."""
+"""Step; score of the current and of the best design, None where items are missed; temperature."""
 
 MAX_POINTS = 600
 """Largest number of points of a chain; beyond, every other point is dropped."""
@@ -61,14 +61,15 @@ def read_curves(folder: RunFolder) -> dict[int, list[Point]]:
     running_best = searches[settings.name].plot_running_best
     curves: dict[int, list[Point]] = {}
     for chain in folder.chains:
-        rows = folder.read(chain, ["step", "efficiency", "temperature", "accepted", "status"])
+        rows = folder.read(chain, ["step", "temperature", *SCORE_COLUMNS])
         count = len(rows["step"])
         if not count:
             continue
-        accepted = rows["accepted"] & (rows["status"] == Status.CONVERGED)
-        best = np.fmax.accumulate(np.where(accepted, rows["efficiency"], np.nan))
-        last = np.maximum.accumulate(np.where(accepted, np.arange(count), -1))
-        current = np.where(last >= 0, rows["efficiency"][last], np.nan)
+        scores = recorded_scores(rows, settings, folder.problem)
+        scores[~(scores > LEAST_MET)] = np.nan
+        best = np.fmax.accumulate(scores)
+        last = np.maximum.accumulate(np.where(np.isnan(scores), -1, np.arange(count)))
+        current = np.where(last >= 0, scores[last], np.nan)
         stride = max(BLOCK, -(-count // (MAX_POINTS // 2)))
         rows_shown = np.append(np.arange(stride - 1, count, stride), [0, count - 1])
         if settings.name == "paper":  # annealing ends within a few hundred steps

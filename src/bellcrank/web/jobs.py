@@ -61,6 +61,8 @@ class Record:
         Efficiency of the result, or of the best design so far.
     objective
         Name and value of what was maximised or minimised, if that is not the efficiency.
+    met
+        Whether the result meets all items by frames; None without a result or a specification.
     done
         Proposals of all chains when the search last ended.
     """
@@ -77,6 +79,7 @@ class Record:
     message: str = ""
     efficiency: float | None = None
     objective: str = ""
+    met: bool | None = None
     done: int = 0
 
 
@@ -137,6 +140,7 @@ class Job:
             if best is not None and record.status in UNFINISHED
             else record.efficiency,
             "objective": record.objective,
+            "met": record.met,
             "method": settings["search"],
             "settings": settings,
             "part": record.part,

@@ -83,7 +83,7 @@ class RefinementReporter:
             "most": self._count.most,
             "seconds": round(passed / done, 3) if done > 0 else None,
             "objective": max((float(each.rows.objective) for each in met), default=None),
-            "share": met[0].share if met else None,
+            "share": self._reached.best[0].share,
         }
 
     def message(self, design: Design) -> dict[str, Any]:

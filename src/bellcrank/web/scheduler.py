@@ -230,6 +230,7 @@ class Scheduler:
                 status=last["kind"],
                 efficiency=last.get("efficiency"),
                 objective=last.get("objective", ""),
+                met=last.get("met"),
                 done=done,
                 message=last.get("message", ""),
             )

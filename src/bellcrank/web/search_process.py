@@ -190,7 +190,10 @@ def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[st
 
 
 def result_of(where: Path) -> dict[str, Any]:
-    """Return the efficiency of a result, and its objective in words unless it is the efficiency."""
+    """Return the efficiency of a result, and whether it meets all items.
+
+    Its objective in words, too, unless it is the efficiency.
+    """
     from bellcrank.fem.results import finite
     from bellcrank.model import read_design
     from bellcrank.part import PartSpec
@@ -200,15 +203,16 @@ def result_of(where: Path) -> dict[str, Any]:
 
     design = read_design(where / "run" / "design.json")
     job = json.loads((where / "job.json").read_text(encoding="utf-8"))
-    objective = ""
+    objective, met = "", None
     if design.problem.is_specified:
         found = evaluated(design.problem, design.mask, ELEMENTS)
         part = PartSpec.from_dict(job["part"] or {}, "part")
         states = [] if found is None else objective_states(design.problem, part, found)
         if states and states[0]["quantity"] != "gain":
             objective = f"{states[0]['label']} {states[0]['reached']}"
+        met = found is not None and all(each.met for each in found.results())
     efficiency = None if design.efficiency is None else finite(design.efficiency)
-    return {"efficiency": efficiency, "objective": objective}
+    return {"efficiency": efficiency, "objective": objective, "met": met}
 
 
 def _start_or_reopen(where: Path) -> RunFolder:

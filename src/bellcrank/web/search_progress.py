@@ -170,10 +170,10 @@ class ProgressReporter:
 
 def _met_score(value: float) -> float | None:
     """Return a score rounded for drawing; None for a design that misses items or constraints."""
-    from bellcrank.search.constraints.evaluator import BASE_PENALTY
+    from bellcrank.search.scores import LEAST_MET
     from bellcrank.web.curves import rounded
 
-    return rounded(value) if value > -0.5 * BASE_PENALTY else None
+    return rounded(value) if value > LEAST_MET else None
 
 
 def _current_mask(state: Any) -> str:

@@ -14,7 +14,6 @@ from bellcrank.fem.results import finite
 from bellcrank.mechanics import (
     VERIFICATION_INCREMENT,
     Response,
-    Status,
     model_evaluator,
 )
 from bellcrank.model import Design, Problem, human_counterpart, write_design
@@ -25,10 +24,8 @@ from bellcrank.search import (
     Progress,
     SearchSettings,
     Selection,
-    Verdict,
     advance_chain,
     candidates_of,
-    costs,
     make_evaluator,
     read_settings,
     run_chains,
@@ -38,6 +35,7 @@ from bellcrank.search import (
     with_stable_initial,
 )
 from bellcrank.search.choice import select_design
+from bellcrank.search.scores import SCORE_COLUMNS, recorded_scores
 from bellcrank.search.verification import ELEMENTS
 from bellcrank.storage import RunFolder, check_no_run, remove_temporaries
 from bellcrank.storage.locking import LOCK, locked
@@ -206,20 +204,15 @@ def accepted_candidates(
     Accepted designs that violate goals are no candidates; those that do not meet a specification
     are, ranked by their scores.
     """
-    specified = folder.problem.is_specified
-    statuses = [Status.CONVERGED, *([Verdict.UNMET] if specified else [])]
-    cost = costs[getattr(settings, "cost", "negative")]
     candidates: list[Candidate] = []
     proposals = 0
     best: list[float] = []
     for chain in range(settings.chains):
-        columns = ["step", "mask", "efficiency", "cost", "accepted", "status"]
-        records = folder.read(chain, columns)
-        taken = np.flatnonzero(records["accepted"] & np.isin(records["status"], statuses))
-        proposals += len(records["accepted"])
-        score = records["efficiency"][taken]
-        if specified:
-            score = np.array([cost.inverse(each) for each in records["cost"][taken].tolist()])
+        records = folder.read(chain, ["step", "mask", *SCORE_COLUMNS])
+        scores = recorded_scores(records, settings, folder.problem)
+        taken = np.flatnonzero(~np.isnan(scores))
+        proposals += len(scores)
+        score = scores[taken]
         best.append(float(score.max(initial=-np.inf)))
         candidates += candidates_of(
             chain, records["step"][taken], records["mask"][taken], score,
@@ -241,7 +234,7 @@ def conclude(
     refining: Callable[[int, RefinementProgress], None] = lambda _number, _progress: None,
     stop: threading.Event | None = None,
     workers: int | None = None,
-    refined: Sequence[Design] = (),
+    refined: Sequence[Design] | None = None,
 ) -> DesignReport | None:
     """Select, clean, verify, refine and compare a design, and write the result files.
 
@@ -254,8 +247,9 @@ def conclude(
     verifying, refining, stop, workers
         As in `complete_design`.
     refined
-        Designs of a refinement that was stopped, the best first; the selected design is replaced by
-        the first that meets all items.
+        Designs of the refinement of a search that was stopped, the best first; the selected design
+        is replaced by the first that meets all items. It is not computed over tolerances then. None
+        for a search that was not stopped.
 
     Returns
     -------
@@ -281,14 +275,16 @@ def conclude(
         if stop is not None and stop.is_set():
             return None
     else:
-        selection = with_refined(selection, refined)
+        selection = with_refined(selection, refined or ())
     elements = None if problem.section is None else ELEMENTS
     all_beams = verification_evaluator(problem, settings, elements, goals=())
     human = human_counterpart(problem)
     human_response = None
     if human is not None:
         human_response = all_beams.evaluate(human.mask, VERIFICATION_INCREMENT)
-    tolerance = _tolerance(selection.design, spec, workers, stop)
+    tolerance = None
+    if refined is None:
+        tolerance = _tolerance(selection.design, spec, workers, stop)
     if stop is not None and stop.is_set():
         return None
     report = DesignReport(
