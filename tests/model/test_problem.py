@@ -10,6 +10,7 @@ from bellcrank.errors import InvalidProblem
 from bellcrank.model import (
     Design,
     Input,
+    ObjectiveTerm,
     Output,
     Stiffness,
     Supports,
@@ -18,6 +19,7 @@ from bellcrank.model import (
     problem_from_dict,
     problem_to_dict,
 )
+from bellcrank.model.specification import ONLY_BOUNDED
 
 
 @pytest.fixture
@@ -191,3 +193,9 @@ def test_designs_travel_between_processes(problem):
 def test_impossible_designs_are_refused(problem, mask, efficiency, message):
     with pytest.raises(InvalidProblem, match=message):
         Design(problem, mask, efficiency)
+
+
+@pytest.mark.parametrize("quantity", ONLY_BOUNDED)
+def test_quantities_without_a_value_along_the_stroke_are_no_objectives(quantity):
+    with pytest.raises(InvalidProblem, match=f"{quantity}: expected a bound, not an objective"):
+        ObjectiveTerm(quantity=quantity, case="case")
