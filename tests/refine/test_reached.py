@@ -10,7 +10,9 @@ from bellcrank.refine.reached import Reached
 
 def record(reached: Reached, number: int, name: str, violation: float, **figures: Any) -> None:
     rows = SimpleNamespace(violation=violation, objective=figures.get("objective", 0.0))
-    progress: Any = SimpleNamespace(rows=rows, design=name, share=figures.get("share"))
+    progress: Any = SimpleNamespace(
+        rows=rows, design=name, share=figures.get("share"), has_objective=True
+    )
     reached.add(number, progress)
 
 

@@ -176,7 +176,8 @@ def test_the_geometry_that_is_shown_is_the_nearest_until_one_meets_all_items() -
         rows: Any = SimpleNamespace(violation=violation, objective=objective)
         own = replace(design, efficiency=objective)
         progress: Any = SimpleNamespace(
-            rows=rows, design=own, evaluations=1, sheets=0, share=None
+            rows=rows, design=own, evaluations=1, sheets=0, share=None,
+            has_objective=True,
         )  # fmt: skip
         reporter.add(number, progress)
         shown.append(None if reporter.design is None else reporter.design.efficiency)
@@ -196,7 +197,12 @@ def test_the_time_of_a_geometry_is_known_from_the_second_one_on(
     found = []
     for evaluations in (1, 16):
         progress: Any = SimpleNamespace(
-            rows=rows, design=None, evaluations=evaluations, sheets=0, share=None
+            rows=rows,
+            design=None,
+            evaluations=evaluations,
+            sheets=0,
+            share=None,
+            has_objective=True,
         )
         reporter.add(0, progress)
         summary = reporter.summary()

@@ -33,7 +33,7 @@ export interface Specification {
   items: Wanted[];
   maximise: Wanted[];
   /** Deviations of random prints that are to meet all items. */
-  tolerances?: { least_yield: number } | null;
+  tolerances?: { least_yield: number; angle: number } | null;
 }
 
 /** A quantity of an output that is bounded or maximised. */
@@ -56,7 +56,7 @@ export function maximisesRotation({ specification }: Problem): boolean { return 
 export function modelOf(problem: Problem): string { return problem.section ? "frames" : "spring model"; }
 
 /** An item of a specification: what is wanted, and what a design reaches in one model. */
-export interface ItemState { name: string; label: string; wanted: string; reached: string; margin: number | null; met: boolean }
+export interface ItemState { name: string; label: string; wanted: string; reached: string; margin: number | null; /** Null while it is not known. */ met: boolean | null }
 
 /** A quantity that is maximised or minimised, and what a design reaches. */
 export interface Objective { quantity: string; label: string; reached: string }

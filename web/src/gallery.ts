@@ -57,8 +57,8 @@ export class RunsPage {
         h("span", { class: "title" }, run.title),
         h("span", { class: `status ${run.status}` }, statusText(run, share),
           run.met !== null && h("b", { class: run.met ? "met" : "missed" }, run.met ? "all items met" : "items missed")),
-        h("span", { class: "value" }, run.objective || (run.efficiency === null ? "" : `objective ${figure(run.efficiency)}`)),
-        h("span", { class: "more" }, `${run.method}, ${count(run.settings.chains, "chain")} of ${run.settings.steps.toLocaleString("en")} steps, seed ${run.settings.seed} · ${ago(run.created)} · ${run.id.slice(0, 4)}`),
+        h("span", { class: "value" }, run.objective || (run.efficiency === null || active ? "" : `output / input ${figure(run.efficiency)}`)),
+        h("span", { class: "more" }, `${run.method}, ${count(run.settings.chains, "chain")} of ${run.settings.steps.toLocaleString("en")} steps, seed ${run.settings.seed} · ${ago(run.created)} · id ${run.id.slice(0, 4)}`),
         active && h("progress", { max: 1, value: share, "aria-label": `${run.title}: progress` })));
     }));
     if (focused) this.list.querySelector<HTMLElement>(`[href="${focused}"]`)?.focus({ preventScroll: true });

@@ -31,18 +31,23 @@ export function limitsPanel(editor: TaskEditor): HTMLElement {
   symmetry.dataset.key = "limit-symmetry";
   symmetry.id = "limit-symmetry";
   const field = (key: keyof Limits, label: string, unit: string, help = ""): HTMLElement =>
-    amount(`limit-${key}`, label, limits[key] as Amount | undefined, unit, (given) => put({ [key]: given }), help);
+    amount(`limit-${key}`, label, unit ? limits[key] as Amount | undefined : ratio(limits[key] as Amount | undefined), unit, (given) => put({ [key]: given }), help);
   const over = h("input", { type: "checkbox", checked: table.tolerance !== undefined, "data-key": "tolerance" });
   over.addEventListener("change", () => editor.change(cleaned({ ...table, tolerance: over.checked ? {} : undefined })));
   return h("div", { class: "content" },
     h("div", { class: "row" },
-      amount("limit-strain", "Strain at most", value("strain"), "", (given) => put({ strain: given }), strainHelp(editor)),
+      amount("limit-strain", "Strain at most", ratio(value("strain")), "", (given) => put({ strain: given }), strainHelp(editor)),
       amount("limit-clearance", "Gap between struts at least", value("clearance"), "mm", (given) => put({ clearance: given }), "empty: they must not touch")),
     h("div", { class: "row" }, field("mass", "Mass at most", "g", "empty: not limited"), field("stable_stroke", "Stable up to", "", "such as 120%; empty: up to the full stroke")),
     h("div", { class: "row" }, field("strut_loss", "Loss of a strut costs at most", "", "such as 30%; empty: not limited"),
       h("div", { class: "field" }, h("label", { for: "limit-symmetry" }, "Symmetry of the design"), symmetry, isSpatial(table) && NEEDS[limits.symmetry ?? ""] && h("small", {}, NEEDS[limits.symmetry ?? ""]))),
     h("label", { class: "tick" }, over, "Design over tolerances of print and drive"),
     table.tolerance !== undefined && toleranceFields(editor, table.tolerance));
+}
+
+/** A ratio as a percentage, as the specification lists it. */
+function ratio(value: Amount | undefined): Amount | undefined {
+  return typeof value === "number" ? `${Number((100 * value).toPrecision(6))}%` : value;
 }
 
 /** The strain limit that holds while the field is empty, as the material of the task has it. */
@@ -56,12 +61,12 @@ function strainHelp({ registries, task: { table: { part, limits } } }: TaskEdito
 
 function toleranceFields(editor: TaskEditor, tolerance: Tolerance): HTMLElement {
   const field = (key: keyof Tolerance, label: string, unit: string, help: string): HTMLElement =>
-    amount(`tolerance-${key}`, label, tolerance[key], unit, (given) =>
+    amount(`tolerance-${key}`, label, unit ? tolerance[key] : ratio(tolerance[key]), unit, (given) =>
       editor.change({ ...editor.task.table, tolerance: cleaned({ ...editor.task.table.tolerance, [key]: given }) }), help);
   const usual = (key: keyof Tolerance): string => `empty: ${editor.registries?.tolerance.find(({ name }) => name === key)?.title ?? "the usual"}`;
   return h("div", {},
-    h("div", { class: "row" }, field("width", "All widths", "", `such as 20%; ${usual("width")}`), field("each_width", "Each width", "", `standard deviation; ${usual("each_width")}`)),
-    h("div", { class: "row" }, field("node", "Nodes", "mm", usual("node")), field("angle", "Direction of the input", "°", usual("angle"))),
-    h("div", { class: "row" }, field("keep", "Prints keep of the gain", "", "such as 80%; empty: they meet all items"), field("least_yield", "Prints that do so at least", "", usual("least_yield"))),
-    h("p", { class: "note" }, `Widths, nodes and the direction of the input of each random print deviate. ${TILTED} Without this, the tolerance of a result can be computed all the same.`));
+    h("div", { class: "row" }, field("width", "All struts alike, width ±", "", `at most, such as 5%; ${usual("width")}`), field("each_width", "Each strut, width ±", "", `standard deviation, such as 2%; ${usual("each_width")}`)),
+    h("div", { class: "row" }, field("node", "Each node ±", "mm", `at most, in each coordinate; ${usual("node")}`), field("angle", "Direction of the input ±", "°", `at most; ${usual("angle")}`)),
+    h("div", { class: "row" }, field("least_yield", "Prints that pass, at least", "", usual("least_yield")), field("keep", "A print passes if it keeps", "", "of the gain, such as 80%; empty: it passes if it meets all items")),
+    h("p", { class: "note" }, `In each random print, widths, nodes and the direction of the input deviate by random amounts up to these. ${TILTED} Without this, the tolerance of a result can be computed all the same.`));
 }

@@ -1,7 +1,7 @@
 // The panels beside the drawing: the task in text and numbers, and its specification.
 
 import { casePanel } from "./casepanel";
-import { clear, count, h } from "./dom";
+import { clear, count, h, percent } from "./dom";
 import { DomainPanel } from "./domainpanel";
 import type { TaskEditor } from "./editing";
 import { limitsPanel } from "./limitspanel";
@@ -163,7 +163,17 @@ export class Panels {
       reached && h("p", { class: `verdict ${reached.every(({ met }) => met) ? "met" : "missed"}` }, `${verdictOf(reached)} by this design.`),
       itemTable(reached ? [{ title: "by hand", items: reached }] : [], wanted),
       !items.some(({ name }) => name.endsWith("strain")) && h("p", { class: "note" }, editor.task.table.limits?.strain === false ? "The strain is not limited." : "The strain is not limited, since no limit of the material is known: enter one under Limits and tolerance."),
+      this.tiltWarning(),
       !items.some(({ name }) => name.endsWith("stable_stroke")) && h("p", { class: "note" }, "The part must be stable up to the full stroke."));
+  }
+
+  /** A warning where the direction of the input may deviate by more than bounds on the off-axis motion allow. */
+  private tiltWarning(): HTMLElement | null {
+    const { tolerances, items = [] } = this.editor.built?.problem?.specification ?? {};
+    const sideways = Math.tan((Math.PI / 180) * (tolerances?.angle ?? 0));
+    const bounds = items.filter(({ quantity }) => quantity === "off_axis").map(({ at_most: most }) => most ?? Infinity);
+    const least = Math.min(Infinity, ...bounds);
+    return !tolerances || least >= sideways ? null : h("p", { class: "note bad" }, `An input that is ${tolerances.angle}° off its direction moves what it pushes sideways by ${percent(sideways)} % of the stroke. Where the output moves with it, many prints miss an off-axis motion of at most ${percent(least)} %, whatever the design: enter a smaller deviation of the direction under Limits and tolerance, or a wider bound under Outputs.`);
   }
 
   private section(key: string, title: string, summary: string, make: () => HTMLElement): HTMLElement {

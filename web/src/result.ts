@@ -37,6 +37,7 @@ interface Print { minutes: number | null; layers: number; layer_mm: number; mass
 const FLAT_BODY = { level: "plane", title: "2D solid", words: "the 2D solid, the printed outline" };
 const SPACE_BODY = { level: "solid", title: "3D solid", words: "the 3D solid, the printed body" };
 
+const FEW_PRINTS = "The part as drawn meets the specification, but too few random prints do: see Tolerance below.";
 /** Time between two questions after what is computed, milliseconds. */
 const SHARE_PERIOD = 2000;
 
@@ -271,10 +272,10 @@ export class Result {
     clear(this.reportBox, columns.length > 0 && itemTable(columns), conditions, ...figureTables(models), models.length > 1 && h("p", { class: "note" }, `–: computed by frames alone, not in ${words}.`), this.charts);
     const better = this.subject.comparison?.efficiency ?? null;
     const defect = unstable ? "The part has no stable path to the full stroke."
-      : last && !isMet ? "The specification is not met."
+      : last && !isMet ? (prints && columns.every(({ items }) => items.every(({ met, name }) => met || name === prints.name)) ? FEW_PRINTS : "The specification is not met.")
       : !last && (first.efficiency ?? 0) <= 0 ? "The output does not move in its direction."
       : better !== null && this.subject.efficiency !== null && better > this.subject.efficiency ? "The design drawn by hand has a higher efficiency." : "";
-    clear(this.advice, defect && h("p", {}, defect), defect && h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text))));
+    clear(this.advice, defect && h("p", {}, defect), defect && defect !== FEW_PRINTS && h("ul", {}, ...REMEDIES.map((text) => h("li", {}, text))));
   }
 
   /** What random prints do, where the specification asks for it and the tolerance is known. */
@@ -404,7 +405,7 @@ export class Result {
     const first = ["drawn", "95 %", "yield"];
     const worst = head!.map((name, k) => ({ name, k })).filter(({ name }) => ![...first, "item", "wanted"].includes(name));
     clear(this.toleranceBox, h("ul", { class: "sentences" }, ...tolerance.sentence.split("; ").map((text) => h("li", {}, sentence(text)))),
-      h("p", { class: "note" }, `All values are by frames. 95 %: the value that 95 of 100 random prints reach. Yield: the part of the prints that meet an item. Worst values are those for ${tolerance.deviations}, and of the prints. Other deviations can be set in the task, under Limits and tolerance.`),
+      h("p", { class: "note" }, `All values are by frames with one element in each strut, where the result has eight. 95 %: the value that 95 of 100 random prints reach. Yield: the part of the prints that meet an item. Worst values are those for ${tolerance.deviations}, and of the prints. Other deviations can be set in the task, under Limits and tolerance.`),
       h("table", { class: "items tolerance" }, h("caption", {}, "Values as drawn, and in the scenarios"),
         h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "item"), ...first.map((name) => h("th", { scope: "col" }, name)))),
         ...rows.map((row) => h("tbody", {},

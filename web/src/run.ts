@@ -1,6 +1,6 @@
 // The progress of a search, and its result.
 
-import { fetchRegistries, follow, get, isInSpace, modelOf, post, remove, type Problem, type Registries, type RunUpdate, type ServerError, type Run, type RunDetails } from "./api";
+import { fetchRegistries, follow, get, isInSpace, modelOf, post, remove, type ItemState, type Problem, type Registries, type RunUpdate, type ServerError, type Run, type RunDetails } from "./api";
 import { bitsOf } from "./api";
 import { Chart } from "./chart";
 import { outputTips } from "./marks";
@@ -25,6 +25,7 @@ export class RunPage {
   private readonly stage = h("section", { class: "stage", "aria-label": "Design" });
   private readonly controls = h("div", { class: "buttons" });
   private readonly trouble = h("p", { class: "fault", role: "alert" });
+  private readonly notice = h("p", { class: "note", role: "status" });
   private readonly readout = h("div", { class: "readout" });
   private readonly watch: HTMLElement;
   private readonly card: HTMLElement;
@@ -56,7 +57,7 @@ export class RunPage {
     this.curveTitle.textContent = !run.problem.specification ? "Efficiency along the search" : `${this.hasObjective ? "Objective" : "Smallest margin of the items"} along the search, before refinement`;
     this.card.hidden = run.refine;
     this.watch = h("aside", { class: "panel", "aria-label": "Search" },
-      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Search"), this.live, this.items, this.controls, this.trouble));
+      h("section", { class: "step open" }, h("h2", { class: "plain" }, "Search"), this.live, this.items, this.controls, this.notice, this.trouble));
     this.side.append(this.watch);
     this.element.append(this.head, h("div", { class: "main" }, this.stage, this.card), this.side);
     this.show(run);
@@ -200,13 +201,13 @@ export class RunPage {
     const specified = Boolean(this.run.problem.specification);
     const tried = this.update?.tried;
     const refined = this.update?.refined;
-    // No time left: a refinement ends when it gains nothing more, often long before its largest number of shapes.
-    const pace = running && refined?.seconds != null ? `, ${figure(refined.seconds, refined.seconds < 1 ? 2 : refined.seconds < 10 ? 1 : 0)} s each; it can end earlier` : "";
+    // A refinement ends when it gains nothing more, often long before its largest number of geometries.
+    const pace = running && refined?.seconds != null && refined.geometries < refined.most ? `, at most about ${duration(refined.seconds * (refined.most - refined.geometries))} more` : "";
     const bound = refined && refined.geometries < refined.most ? ` of at most ${run.refine ? "" : "about "}${refined.most.toLocaleString("en")}` : "";
-    const refining = refined && `${count(refined.designs, "design")}, ${refined.geometries.toLocaleString("en")}${bound} shapes${pace}${refined.sheets ? `, ${count(refined.sheets, "check")} ${isInSpace(this.run.problem) ? "with deviations of the print" : "in the 2D solid"}` : ""}`;
+    const refining = refined && `${count(refined.designs, "design")}, ${refined.geometries.toLocaleString("en")}${bound} geometries${pace}${refined.sheets ? `, ${count(refined.sheets, "check")} ${isInSpace(this.run.problem) ? "with deviations of the print" : "in the 2D solid"}` : ""}`;
     const phase = refined ? "refinement" : tried ? "verification" : "search";
     const phases = ["search", "verification", ...(specified ? ["refinement"] : [])];
-    const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${count(done, "shape")} computed`)], ...this.printsRow()] : [
+    const rows: [string, string][] = run.refine ? [["refinement", refining || (running ? "starting …" : `${count(done, "geometry", "geometries")} computed`)], ...this.printsRow()] : [
       ...(running ? [["phase", `${phases.indexOf(phase) + 1} of ${phases.length}: ${phase}`]] as [string, string][] : []),
       [!specified ? "best so far" : this.hasObjective ? "best value of the search" : "largest margin of the search", this.bestText(run)],
       ["steps", `${done.toLocaleString("en")} of ${run.total.toLocaleString("en")}`],
@@ -228,7 +229,7 @@ export class RunPage {
     const isMet = reached?.every(({ met }) => met);
     const few = this.missedPrints;
     clear(this.items, !this.result && reached && h("p", { class: `verdict ${isMet && few === null ? "met" : "missed"}` }, `${verdictOf(reached)} by the ${this.update!.moved!.problem ? "best refined design so far" : "best design so far, before refinement"}${isMet && few !== null ? ` as drawn, but by ${few} % of random prints only` : ""}${isMet && run.status === "running" ? `; “${run.refine ? TAKE : CHOOSE}” is possible` : ""}.`),
-      !this.result && reached && itemTable([{ title: "frames", items: reached }]));
+      !this.result && reached && itemTable([{ title: "frames", items: [...reached, ...this.printsItem()] }]));
     if (run.message && run.status !== "running") this.showMessage(run);
     if (!this.result) {
       const moved = this.update?.moved;
@@ -251,6 +252,14 @@ export class RunPage {
   private get missedPrints(): string | null {
     const { prints } = this;
     return prints && prints.share < prints.needed ? percent(prints.share) : null;
+  }
+
+  /** What the specification asks of random prints, as an item. */
+  private printsItem(): ItemState[] {
+    const needed = this.run.problem.specification?.tolerances?.least_yield;
+    if (needed === undefined) return [];
+    const share = this.prints?.share ?? null;
+    return [{ name: "tolerance", label: "random prints", wanted: `${percent(needed)} % pass`, reached: share === null ? "in the refinement" : `${percent(share)} %`, margin: share === null ? null : share - needed, met: share === null ? null : share >= needed }];
   }
 
   private printsRow(): [string, string][] {
@@ -321,6 +330,7 @@ export class RunPage {
           problem: moved.problem ?? run.problem, mask: moved.mask, title: `${run.title}, best so far`.slice(0, 120), provenance: { kind: "machine", part: run.part, task: run.task },
         });
         open(`#/design/${source}/${key}`, "_blank", "noopener");
+        this.notice.textContent = "The best design so far is kept in the gallery, and open in another tab.";
       } catch (error) {
         this.trouble.textContent = sentence((error as ServerError).message);
       }

@@ -15,7 +15,7 @@ export function otherObjective(objectives: Objective[]): Objective | null {
 
 /** One sentence on a list of items: whether all are met, and which one is farthest from it. */
 export function verdictOf(items: ItemState[]): string {
-  const missed = items.filter(({ met }) => !met);
+  const missed = items.filter(({ met }) => met === false);
   if (!missed.length) return `All ${count(items.length, "item")} met`;
   const worst = missed.reduce((a, b) => ((b.margin ?? -Infinity) < (a.margin ?? -Infinity) ? b : a));
   return `${missed.length} of ${count(items.length, "item")} missed, farthest: ${worst.label}`;
@@ -24,8 +24,8 @@ export function verdictOf(items: ItemState[]): string {
 /** A table of items: whether each is met in the last model, what is wanted, and what is reached. */
 export function itemTable(columns: Column[], wanted: ItemState[] = []): HTMLElement {
   const last = columns.at(-1)?.items ?? wanted;
-  const rows = last.map((item, k) => h("tr", { class: columns.length ? (item.met ? "met" : "missed") : "open", "data-item": item.name },
-    h("td", {}, columns.length ? mark(item.met) : ""),
+  const rows = last.map((item, k) => h("tr", { class: columns.length && item.met !== null ? (item.met ? "met" : "missed") : "open", "data-item": item.name },
+    h("td", {}, columns.length && item.met !== null ? mark(item.met) : ""),
     h("th", { scope: "row" }, item.label, h("small", {}, item.wanted)),
     ...columns.map(({ items }) => h("td", {}, items[k]?.reached ?? "–")),
     columns.length > 0 && h("td", { class: "more" }, marginText(columns.map(({ items }) => items[k]?.margin ?? null)))));

@@ -62,7 +62,7 @@ export const REMEDIES = [
 ];
 
 /** Why an input that turns may miss a bound on off-axis motion: sin 5° = 0.087. */
-export const TILTED = "A push that is 5° off moves what it pushes sideways by 9 % of the stroke.";
+export const TILTED = "If the push is 5° off its direction, what it pushes moves sideways by 9 % of the stroke, and an output beside it by about as much: such a print misses a smaller bound on the off-axis motion.";
 
 /** Message of a search without the options of the command line. */
 export function runMessage(message: string): string {

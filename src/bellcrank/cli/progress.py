@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -16,6 +15,7 @@ from bellcrank.search.scores import LEAST_MET
 
 if TYPE_CHECKING:
     from bellcrank.model import Problem
+    from bellcrank.refine.reached import Reached
     from bellcrank.refine.refinement import Progress as RefinementStep
     from bellcrank.workflows.refiners import GeometryCount
 
@@ -38,7 +38,7 @@ class SearchProgress(Live):
         self._made = self._accepted = 0
         self._temperature = 0.0
         self._geometries: GeometryCount | None = None
-        self._best_refined = -math.inf
+        self._reached: Reached
         self._start = time.monotonic()
         super().__init__("searching", self._total, TextColumn("left"), TimeRemainingColumn())
 
@@ -65,25 +65,34 @@ class SearchProgress(Live):
 
     def refining(self, number: int, step: RefinementStep) -> None:
         """Show how many geometries are refined, and the best objective that meets all items."""
-        from bellcrank.refine.by_frames import MET
+        from bellcrank.refine.reached import Reached
         from bellcrank.workflows.refiners import GeometryCount
 
         with self._lock:
             if self._geometries is None:
+                self._reached = Reached()
                 self._geometries = GeometryCount(self._chains, self._problem)
                 self._bar.update(self._task, description="refining ")
             self._geometries.add(number, step.evaluations)
-            if step.rows.violation <= MET:
-                self._best_refined = max(self._best_refined, step.rows.objective)
+            self._reached.add(number, step)
             done, most = self._geometries.done, max(self._geometries.done, self._geometries.most)
-            best = f"best objective {self._best_refined:.3f}"
-            figures = best if math.isfinite(self._best_refined) else "no design meets all items yet"
+            figures = self._reached_text()
             if step.sheets:
                 is_flat = self._problem.lattice.dimension == 2
                 model = "in the sheet" if is_flat else "with imperfections"
                 figures += f", design {number + 1} computed {model}"
             line = f"refining: {done} of at most {most} geometries, {figures}"
             self._show(done, most, figures, line)
+
+    def _reached_text(self) -> str:
+        """Return the objective of the best refined design, and the prints that meet all items."""
+        if not self._reached.met:
+            return "no design meets all items yet"
+        best = self._reached.met[0]
+        prints = "" if best.share is None else f", {best.share:.0%} of random prints"
+        if not best.has_objective:
+            return f"all items met{prints}"
+        return f"best objective {best.rows.objective:.3f}{prints}"
 
     def _figures(self) -> str:
         speed = self._made / max(time.monotonic() - self._start, 1e-9)

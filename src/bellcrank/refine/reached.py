@@ -62,9 +62,9 @@ def share_of(progress: Progress) -> float:
     return 1.0 if progress.share is None else progress.share
 
 
-def _rank(progress: Progress) -> tuple[float, float]:
+def _rank(progress: Progress) -> tuple[float, bool, float]:
     """Return how good a geometry is that meets all items; larger is better."""
-    return share_of(progress), progress.rows.objective
+    return share_of(progress), progress.has_objective, progress.rows.objective
 
 
 def _nearness(progress: Progress) -> float:

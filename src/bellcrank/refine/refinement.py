@@ -103,6 +103,8 @@ class Progress:
         Part of the random prints that met all items when all were computed last, at most the
         wanted yield, with deviations `bellcrank.refine.choice.LARGER` times those that are
         tolerated; None without prints.
+    has_objective
+        Whether the objective of the rows is that of the specification, and not the smallest margin.
     """
 
     step: int
@@ -114,6 +116,7 @@ class Progress:
     sheets: int = 0
     design: Design | None = None
     share: float | None = None
+    has_objective: bool = True
 
 
 def refine_rows(
@@ -171,7 +174,7 @@ class _Search:
         assert self.rows is not None
         return Progress(
             self.step, self.evaluations, self.vector, self.rows, self.region, reason,
-            share=self.evaluator.share,
+            share=self.evaluator.share, has_objective=self.evaluator.drawn.has_objectives,
         )  # fmt: skip
 
     def reason(self) -> str:

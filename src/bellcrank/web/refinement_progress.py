@@ -76,13 +76,14 @@ class RefinementReporter:
         done = self._count.done - self._before
         assert self._began is not None
         passed = time.monotonic() - self._began
+        objectives = [float(each.rows.objective) for each in met if each.has_objective]
         return {
             "designs": len(latest),
             "geometries": self._count.done,
             "sheets": sum(each.sheets for each in latest),
             "most": self._count.most,
             "seconds": round(passed / done, 3) if done > 0 else None,
-            "objective": max((float(each.rows.objective) for each in met), default=None),
+            "objective": max(objectives, default=None),
             "share": self._reached.best[0].share,
         }
 

@@ -135,7 +135,8 @@ def _with_share(state: State, progress: Progress) -> State:
     """Return a state with the part of prints of a step, and with its objective over them."""
     if progress.share is None or not state.is_stable:
         return state
-    return replace(state, share=progress.share, objective=progress.rows.objective)
+    objective = progress.rows.objective if progress.has_objective else state.objective
+    return replace(state, share=progress.share, objective=objective)
 
 
 def _rank(progress: Progress, number: int) -> tuple[bool, float, int]:

@@ -317,7 +317,8 @@ def tolerance_sentence(report: ToleranceReport) -> str:
         sizes = report.deviations.tolerances
         sentence += (
             f"; {met} of {len(prints)} random prints {met_words(report)}: widths up to "
-            f"{sizes.width:.0%} off, each with a standard deviation of {sizes.each_width:.0%}, "
+            f"{100.0 * sizes.width:g}% off, each with a standard deviation of "
+            f"{100.0 * sizes.each_width:g}%, "
             f"nodes up to {report.spec.scale * sizes.node:.2g} mm off, inputs turned by up to "
             f"{sizes.angle:g} degrees"
         )
