@@ -426,7 +426,11 @@ export class Result {
     const needed = cost.filter((each) => each === null).length;
     const half = cost.filter((each) => each !== null && each > 0.5).length;
     if (cost.length && !needed && !half) return h("p", { class: "note" }, `Without any one of its struts the part reaches the full stroke, with at least half of the ${measure}.`);
-    return h("p", { class: "note" }, `Of ${cost.length} struts that are not between two supports, ${needed} are needed to reach the full stroke, and the loss of ${half} others costs more than half of the ${measure}. “Loss of struts” in the drawing colours them.`);
+    const texts = [
+      needed && `${needed} of ${count(cost.length, "strut")} ${needed === 1 ? "is" : "are each"} needed: without it the part does not reach the full stroke.`,
+      half && `${half}${needed ? " other" : ""} ${half === 1 ? "strut carries" : "struts each carry"} much: without it the part has less than half of the ${measure}.`,
+    ].filter(Boolean);
+    return h("p", { class: "note" }, `${texts.join(" ")} “Loss of struts” in the drawing colours them.`);
   }
 
   private showPart(fault = ""): void {

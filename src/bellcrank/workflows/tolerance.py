@@ -149,16 +149,19 @@ def with_tolerances(design: Design, spec: PartSpec) -> Design:
 
 
 def deviations_of(design: Design, spec: PartSpec, **changes: Any) -> Deviations:
-    """Return the usual deviations of a design as a part, with its own tolerances.
+    """Return the usual deviations of a design as a part, or those that its specification states.
 
     Parameters
     ----------
     **changes
         Fields of `bellcrank.tolerance.Deviations` with other values.
     """
-    usual: dict[str, Any] = {
-        "tolerances": tolerances_of(design, spec), "width": WIDTH / spec.scale
-    }  # fmt: skip
+    wanted = design.problem.specification
+    usual: dict[str, Any] = {"tolerances": tolerances_of(design, spec)}
+    if wanted is not None and wanted.tolerances is not None:
+        usual |= {"width": 0.0, "thin": 0.0}
+    else:
+        usual["width"] = WIDTH / spec.scale
     return Deviations(**{**usual, **changes})
 
 
