@@ -176,7 +176,7 @@ def test_errors_name_the_sections_of_the_page(page: Any) -> None:
     assert "without errors" in page.locator(".specification").inner_text()
     wrong = page.locator('[data-key="outputs-0-off_axis-0"][aria-invalid="true"]')
     assert wrong.count() == page.locator("[aria-invalid]").count() == 1
-    assert page.locator(".search .fault").inner_text() == text
+    assert page.locator(".start-search .fault").inner_text() == text
     page.keyboard.press("Control+z")
     page.locator("[aria-invalid]").wait_for(state="detached")
 
@@ -345,3 +345,31 @@ def test_an_output_that_moves_again_has_its_items_back(page: Any) -> None:
     until(page, lambda: "off_axis" not in task(page)["table"]["cases"][0]["outputs"][0])
     motion.get_by_text("moves").click()
     until(page, lambda: task(page)["table"]["cases"][0]["outputs"][0] == before)
+
+
+def test_tolerances_that_no_design_meets_are_named_and_ratios_are_percentages(page: Any) -> None:
+    page.get_by_label("or start from").select_option("twist-column")
+    until(page, lambda: task(page)["table"]["name"] == "twist-column")
+    section(page, "limits")
+    assert field(page, "Strain at most") == "4%"
+    warning = page.locator(".specification .bad")
+    assert not warning.count()
+    page.get_by_label("Design over tolerances of print and drive").check()
+    warning.wait_for()
+    assert "5° off its direction" in warning.inner_text()
+    assert "sideways by 8.7 % of the stroke" in warning.inner_text()
+    assert "an off-axis motion of at most 5 %" in warning.inner_text()
+    fill(page, "Direction of the input ±", "1")
+    until(page, lambda: not warning.count())
+    fill(page, "Each strut, width ±", "2.5%")
+    until(page, lambda: task(page)["table"]["tolerance"]["each_width"] == "2.5%")
+
+
+def test_the_button_that_starts_a_search_stays_in_view(page: Any) -> None:
+    page.set_viewport_size({"width": 1440, "height": 600})
+    button = page.get_by_role("button", name="Design it")
+    assert page.evaluate("document.documentElement.scrollHeight") > 1000
+    box = button.bounding_box()
+    assert box["y"] + box["height"] <= 600.0
+    section(page, "limits")
+    assert button.bounding_box()["y"] + box["height"] <= 600.0

@@ -4,7 +4,6 @@ import { h, select } from "./dom";
 import type { TaskEditor } from "./editing";
 import { amount } from "./fields";
 import { cleaned, isSpatial, type Amount, type Limits, type Tolerance } from "./task";
-import { TILTED } from "./text";
 
 const SYMMETRIES: [string, string][] = [["", "none"], ["x", "left and right"], ["y", "up and down"], ["xy", "both"]];
 const SYMMETRIES_IN_SPACE: [string, string][] = [
@@ -68,5 +67,5 @@ function toleranceFields(editor: TaskEditor, tolerance: Tolerance): HTMLElement 
     h("div", { class: "row" }, field("width", "All struts alike, width ±", "", `at most, such as 5%; ${usual("width")}`), field("each_width", "Each strut, width ±", "", `standard deviation, such as 2%; ${usual("each_width")}`)),
     h("div", { class: "row" }, field("node", "Each node ±", "mm", `at most, in each coordinate; ${usual("node")}`), field("angle", "Direction of the input ±", "°", `at most; ${usual("angle")}`)),
     h("div", { class: "row" }, field("least_yield", "Prints that pass, at least", "", usual("least_yield")), field("keep", "A print passes if it keeps", "", "of the gain, such as 80%; empty: it passes if it meets all items")),
-    h("p", { class: "note" }, `In each random print, widths, nodes and the direction of the input deviate by random amounts up to these. ${TILTED} Without this, the tolerance of a result can be computed all the same.`));
+    h("p", { class: "note" }, `In each random print, widths, nodes and the direction of the input deviate by random amounts up to these. Without this, the tolerance of a result can be computed all the same.`));
 }

@@ -170,7 +170,7 @@ export class Panels {
   /** A warning where the direction of the input may deviate by more than bounds on the off-axis motion allow. */
   private tiltWarning(): HTMLElement | null {
     const { tolerances, items = [] } = this.editor.built?.problem?.specification ?? {};
-    const sideways = Math.tan((Math.PI / 180) * (tolerances?.angle ?? 0));
+    const sideways = Math.sin((Math.PI / 180) * (tolerances?.angle ?? 0));
     const bounds = items.filter(({ quantity }) => quantity === "off_axis").map(({ at_most: most }) => most ?? Infinity);
     const least = Math.min(Infinity, ...bounds);
     return !tolerances || least >= sideways ? null : h("p", { class: "note bad" }, `An input that is ${tolerances.angle}° off its direction moves what it pushes sideways by ${percent(sideways)} % of the stroke. Where the output moves with it, many prints miss an off-axis motion of at most ${percent(least)} %, whatever the design: enter a smaller deviation of the direction under Limits and tolerance, or a wider bound under Outputs.`);

@@ -9,7 +9,7 @@ import { Player, type Picture } from "./player";
 import { figureTables, FRAMES, itemTable, otherObjective, verdictOf, type Column } from "./specification";
 import { strokeCharts } from "./strokechart";
 import type { Table } from "./task";
-import { fileName, REMEDIES, sentence, TILTED } from "./text";
+import { fileName, REMEDIES, sentence, tilted } from "./text";
 
 export interface Subject {
   title: string;
@@ -37,6 +37,8 @@ interface Print { minutes: number | null; layers: number; layer_mm: number; mass
 const FLAT_BODY = { level: "plane", title: "2D solid", words: "the 2D solid, the printed outline" };
 const SPACE_BODY = { level: "solid", title: "3D solid", words: "the 3D solid, the printed body" };
 
+/** Deviation of the direction of the input that is usual, degrees. */
+const USUAL_ANGLE = 5;
 const FEW_PRINTS = "The part as drawn meets the specification, but too few random prints do: see Tolerance below.";
 /** Time between two questions after what is computed, milliseconds. */
 const SHARE_PERIOD = 2000;
@@ -253,7 +255,7 @@ export class Result {
     else if (report.items.search) columns.push({ title: "search", items: report.items.search });
     if (solid?.items) columns.push({ title, items: solid.items });
     const prints = this.printsItem(report);
-    if (prints) for (const [k, column] of columns.entries()) column.items = [...column.items, k ? { ...prints, reached: "" } : prints];
+    if (prints) for (const [k, column] of columns.entries()) column.items = [...column.items, k ? { ...prints, reached: "–" } : prints];
     const last = columns.at(-1)?.items ?? null;
     const unstable = !first || first.efficiency === undefined || (report.specified && !report.items.frames);
     const isMet = last !== null && columns.every(({ items }) => items.every(({ met }) => met)) && !unstable;
@@ -418,7 +420,7 @@ export class Result {
   /** The next step where too few random prints meet all items. */
   private toleranceStep({ met, prints }: ToleranceFound): HTMLElement[] {
     if (!this.subject.problem.specification || !prints || met >= this.leastYield * prints) return [];
-    return [h("p", { class: "note" }, `Refine over tolerances moves the nodes of this design and changes its widths until the items are met with deviations, too, where that is possible. The direction of the push deviates in random prints, too. ${TILTED} No refinement changes that: a wider bound or smaller deviations are set in the task.`),
+    return [h("p", { class: "note" }, `Refine over tolerances moves the nodes of this design and changes its widths until the items are met with deviations, too, where that is possible. The direction of the push deviates in random prints, too. ${tilted(this.subject.problem.specification.tolerances?.angle ?? USUAL_ANGLE)} No refinement changes that: a wider bound or smaller deviations are set in the task.`),
       button("Refine over tolerances", () => void this.begin({ refine: true, tolerant: true }), "", { "data-key": "refine-tolerant" })];
   }
 

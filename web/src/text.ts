@@ -1,5 +1,7 @@
 // Sentences, file names, and the keys for undo.
 
+import { percent } from "./dom";
+
 export function fileName(title: string): string {
   return title.trim().toLowerCase().replaceAll(/[^a-z0-9]+/g, "-").replaceAll(/^-|-$/g, "") || "bellcrank";
 }
@@ -61,8 +63,10 @@ export const REMEDIES = [
   "Reduce the requirement: less motion of the output, wider bounds, or an output closer to the input.",
 ];
 
-/** Why an input that turns may miss a bound on off-axis motion: sin 5° = 0.087. */
-export const TILTED = "If the push is 5° off its direction, what it pushes moves sideways by 9 % of the stroke, and an output beside it by about as much: such a print misses a smaller bound on the off-axis motion.";
+/** Why an input that turns by some degrees may miss a bound on the off-axis motion. */
+export function tilted(degrees: number): string {
+  return `If the push is ${degrees}° off its direction, what it pushes moves sideways by ${percent(Math.sin((Math.PI / 180) * degrees))} % of the stroke, and an output beside it by about as much: such a print misses a smaller bound on the off-axis motion.`;
+}
 
 /** Message of a search without the options of the command line. */
 export function runMessage(message: string): string {

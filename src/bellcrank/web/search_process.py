@@ -192,7 +192,8 @@ def _refine(where: Path, pipe: Connection, listener: CommandListener) -> dict[st
 def result_of(where: Path) -> dict[str, Any]:
     """Return the efficiency of a result, and whether it meets all items.
 
-    Its objective in words, too, unless it is the efficiency.
+    Its objective in words, too, unless it is the efficiency. Of a task with tolerances it is not
+    known whether all are met where random prints were not computed.
     """
     from bellcrank.fem.results import finite
     from bellcrank.model import read_design
@@ -203,7 +204,8 @@ def result_of(where: Path) -> dict[str, Any]:
 
     design = read_design(where / "run" / "design.json")
     job = json.loads((where / "job.json").read_text(encoding="utf-8"))
-    objective, met = "", None
+    objective = ""
+    met: bool | None = None
     if design.problem.is_specified:
         found = evaluated(design.problem, design.mask, ELEMENTS)
         part = PartSpec.from_dict(job["part"] or {}, "part")
@@ -211,8 +213,19 @@ def result_of(where: Path) -> dict[str, Any]:
         if states and states[0]["quantity"] != "gain":
             objective = f"{states[0]['label']} {states[0]['reached']}"
         met = found is not None and all(each.met for each in found.results())
+        wanted = design.problem.specification
+        if met and wanted is not None and wanted.tolerances is not None:
+            met = _prints_pass(where / "run" / "summary.json", wanted.tolerances.least_yield)
     efficiency = None if design.efficiency is None else finite(design.efficiency)
     return {"efficiency": efficiency, "objective": objective, "met": met}
+
+
+def _prints_pass(summary: Path, least: float) -> bool | None:
+    """Return whether enough random prints meet all items; None where they were not computed."""
+    if not summary.exists():
+        return None
+    found = json.loads(summary.read_text(encoding="utf-8"))["tolerance"]
+    return None if found is None else bool(found["yield"] >= least)
 
 
 def _start_or_reopen(where: Path) -> RunFolder:
