@@ -373,3 +373,16 @@ def test_the_button_that_starts_a_search_stays_in_view(page: Any) -> None:
     assert box["y"] + box["height"] <= 600.0
     section(page, "limits")
     assert button.bounding_box()["y"] + box["height"] <= 600.0
+
+
+def test_the_spread_of_a_force_is_a_ratio(page: Any) -> None:
+    """A bound of 0.1 became 0.1 N, which is refused."""
+    page.get_by_label("or start from").select_option("constant-force")
+    until(page, lambda: task(page)["table"]["name"] == "constant-force")
+    tool(page, "Outputs")
+    bound = page.locator('[data-key="case-force-0"]')
+    assert bound.input_value() == "0.1"
+    bound.fill("0.2")
+    page.keyboard.press("Tab")
+    until(page, lambda: task(page)["table"]["cases"][0]["input_force"][0]["at_most"] == 0.2)
+    page.locator(".specification", has_text="at most 20 %").wait_for()

@@ -350,11 +350,11 @@ function itemRow(key: string, name: string, { title, bound: usual, example, abou
   const extra: (keyof Bounds)[] = ["at_least", "at_most", "target", "tolerance", "from", "to", "scale"];
   const labels: Record<string, string> = { at_least: "at least", at_most: "at most", target: "equal to", tolerance: "tolerance", from: "from (stroke)", to: "to (stroke)", scale: "scale" };
   const hasMore = extra.some((other) => other !== bound && known[other] !== undefined) || known.of !== undefined;
-  const of = select([["", "every value"], ["largest", "the largest"], ["smallest", "the smallest"], ["spread", "the spread"]], known.of ?? "", (picked) => change({ of: picked || undefined } as Bounds));
+  const of = select([["", "every value"], ["largest", "the largest"], ["smallest", "the smallest"], ["spread", "the spread"]], known.of ?? "", (picked) => change({ ...(picked === "spread" ? plain(known) : {}), of: picked || undefined } as Bounds));
   of.dataset.key = `${key}-of`;
-  // A load is in N or g, so that its unit is written.
-  const own = (next: Amount | undefined): Amount | undefined => (typeof next === "number" && unit.startsWith("N") ? `${next} ${unit}` : next);
-  const input = amount(key, "", value, typeof value === "string" ? "" : unit, (next) => change({ [bound]: own(next) }), value === undefined && !isMaximised ? `such as ${example}` : "");
+  // A load is in N or g, so that its unit is written; a spread is a ratio.
+  const own = (next: Amount | undefined): Amount | undefined => (typeof next === "number" && unit.startsWith("N") && known.of !== "spread" ? `${next} ${unit}` : next);
+  const input = amount(key, "", value, typeof value === "string" || known.of === "spread" ? "" : unit, (next) => change({ [bound]: own(next) }), value === undefined && !isMaximised ? `such as ${example}` : "");
   input.querySelector("label")!.remove();
   input.querySelector("input")!.setAttribute("aria-label", title);
   return h("div", { class: "item", "data-item": name },
@@ -370,6 +370,15 @@ function itemRow(key: string, name: string, { title, bound: usual, example, abou
       h("div", { class: "row" }, ...extra.filter((other) => other !== bound).map((other) =>
         amount(`${key}-${other}`, labels[other]!, known[other] as Amount | undefined, "", (next) => change({ [other]: ["at_least", "at_most", "target"].includes(other) ? own(next) : next } as Bounds))),
       field("In the range, bounds", of))));
+}
+
+/** Bounds without the unit that was added to a number. */
+function plain(bounds: Bounds): Bounds {
+  const keys = ["at_least", "at_most", "target"] as const;
+  return Object.fromEntries(keys.flatMap((key) => {
+    const given = /^([\d.]+) N(\/mm)?$/.exec(String(bounds[key] ?? ""));
+    return given ? [[key, Number(given[1])]] : [];
+  })) as Bounds;
 }
 
 /** A list of bounds with one of them replaced, or removed. */

@@ -25,3 +25,8 @@ export function read(text: string): Amount | undefined {
 export function shown(value: Amount): string {
   return typeof value === "number" ? String(Number(value.toPrecision(6))) : value;
 }
+
+/** A ratio as a percentage, as the specification lists it. */
+export function ratio(value: Amount | undefined): Amount | undefined {
+  return typeof value === "number" ? `${Number((100 * value).toPrecision(6))}%` : value;
+}

@@ -2,7 +2,7 @@
 
 import { h, select } from "./dom";
 import type { TaskEditor } from "./editing";
-import { amount } from "./fields";
+import { amount, ratio } from "./fields";
 import { cleaned, isSpatial, type Amount, type Limits, type Tolerance } from "./task";
 
 const SYMMETRIES: [string, string][] = [["", "none"], ["x", "left and right"], ["y", "up and down"], ["xy", "both"]];
@@ -42,11 +42,6 @@ export function limitsPanel(editor: TaskEditor): HTMLElement {
       h("div", { class: "field" }, h("label", { for: "limit-symmetry" }, "Symmetry of the design"), symmetry, isSpatial(table) && NEEDS[limits.symmetry ?? ""] && h("small", {}, NEEDS[limits.symmetry ?? ""]))),
     h("label", { class: "tick" }, over, "Design over tolerances of print and drive"),
     table.tolerance !== undefined && toleranceFields(editor, table.tolerance));
-}
-
-/** A ratio as a percentage, as the specification lists it. */
-function ratio(value: Amount | undefined): Amount | undefined {
-  return typeof value === "number" ? `${Number((100 * value).toPrecision(6))}%` : value;
 }
 
 /** The strain limit that holds while the field is empty, as the material of the task has it. */

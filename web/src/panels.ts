@@ -1,15 +1,15 @@
 // The panels beside the drawing: the task in text and numbers, and its specification.
 
 import { casePanel } from "./casepanel";
-import { clear, count, h, percent } from "./dom";
+import { button, choice, clear, count, h, percent } from "./dom";
 import { DomainPanel } from "./domainpanel";
 import type { TaskEditor } from "./editing";
+import { ratio } from "./fields";
 import { limitsPanel } from "./limitspanel";
 import { SearchBox } from "./searchbox";
 import { itemTable, verdictOf } from "./specification";
 import { isSpatial, nodesOf, type Hold, type Kind } from "./task";
 import { sentence } from "./text";
-import { button, choice } from "./dom";
 
 const OWNERS: [RegExp, string][] = [
   [/^(domain|lattice|positions|beams|name)/, "domain"],
@@ -263,7 +263,7 @@ export class Panels {
   private limitsSummary(): string {
     const { limits, tolerance } = this.editor.task.table;
     const { strain, clearance } = limits ?? {};
-    const parts = [strain !== undefined && typeof strain !== "boolean" && `strain ${strain}`, clearance !== undefined && typeof clearance !== "boolean" && "clearance", limits?.symmetry && (/fold/.test(limits.symmetry) ? `${limits.symmetry} symmetry` : `symmetric in ${limits.symmetry}`), limits?.mass !== undefined && "mass", limits?.strut_loss !== undefined && "strut loss", tolerance && "tolerance"];
+    const parts = [strain !== undefined && typeof strain !== "boolean" && `strain ${ratio(strain)}`, clearance !== undefined && typeof clearance !== "boolean" && "clearance", limits?.symmetry && (/fold/.test(limits.symmetry) ? `${limits.symmetry} symmetry` : `symmetric in ${limits.symmetry}`), limits?.mass !== undefined && "mass", limits?.strut_loss !== undefined && "strut loss", tolerance && "tolerance"];
     return parts.filter(Boolean).join(", ") || "strain and clearance";
   }
 
